@@ -1,0 +1,87 @@
+//! Tissue growth: how much larger the organ is after each step (Rauch & Harders 2021, section 3, "Vessel Tree Updates").
+//!
+//! Nothing is moved. Positions stay relative to the tissue, and every length of the settings is multiplied by
+//! λ_t = σ₀/σ_t instead, so vessels become finer as the organ grows.
+
+/// Growth of the tissue during a step, as a law for its size σ relative to the start (σ₀ = 1).
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub enum TissueGrowth {
+    /// The organ keeps its size.
+    None,
+    /// σ rises by this much each step. The paper's law, with 0.02.
+    Linear(f32),
+    /// σ rises by this share of itself each step.
+    Exponential(f32),
+    /// σ after each step, from the first on; the last value stays in force. For laws of the user's own.
+    Table(Vec<f32>),
+}
+
+impl TissueGrowth {
+    /// The paper's increment of σ in a step.
+    pub const DEFAULT_LINEAR: f32 = 0.02;
+
+    /// Tabulates a law of the user's own for `steps` steps: `law(step)` is σ after that step, `law(1)` being the first.
+    pub fn from_fn(steps: u32, law: impl Fn(u32) -> f32) -> Self {
+        Self::Table((1..=steps).map(law).collect())
+    }
+
+    /// Size σ after `step` steps, computed from the size before that step.
+    pub(crate) fn advance(&self, size: f32, step: u32) -> f32 {
+        match self {
+            Self::None => size,
+            Self::Linear(increment) => size + increment,
+            Self::Exponential(share) => size + size * share,
+            Self::Table(sizes) => {
+                let index = (step.max(1) as usize - 1).min(sizes.len().saturating_sub(1));
+                sizes.get(index).copied().unwrap_or(size)
+            }
+        }
+    }
+
+    /// Whether every size that this law gives within `steps` steps is finite and above zero.
+    pub(crate) fn check(&self, steps: u32) -> Result<(), f32> {
+        let mut size = 1.0;
+        for step in 1..=steps {
+            size = self.advance(size, step);
+            if !(size.is_finite() && size > 0.0) {
+                return Err(size);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Default for TissueGrowth {
+    fn default() -> Self {
+        Self::Linear(Self::DEFAULT_LINEAR)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn size_after(growth: &TissueGrowth, steps: u32) -> f32 {
+        (1..=steps).fold(1.0, |size, step| growth.advance(size, step))
+    }
+
+    #[test]
+    fn laws_follow_their_formula() {
+        assert_eq!(size_after(&TissueGrowth::None, 50), 1.0);
+        assert!((size_after(&TissueGrowth::Linear(0.02), 100) - 3.0).abs() < 1e-4);
+        assert!((size_after(&TissueGrowth::Exponential(0.01), 100) - 1.01f32.powi(100)).abs() < 1e-3);
+        let own = TissueGrowth::from_fn(3, |step| 1.0 + step as f32);
+        assert_eq!(size_after(&own, 2), 3.0);
+        assert_eq!(size_after(&own, 9), 4.0);
+        assert_eq!(size_after(&TissueGrowth::Table(vec![]), 9), 1.0);
+    }
+
+    #[test]
+    fn a_size_of_zero_or_infinity_is_found() {
+        assert!(TissueGrowth::Linear(-0.1).check(9).is_ok());
+        assert!(TissueGrowth::Linear(-0.1).check(20).is_err());
+        assert!(TissueGrowth::Exponential(10.0).check(100).is_err());
+    }
+}

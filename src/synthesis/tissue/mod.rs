@@ -1,0 +1,73 @@
+//! Tissue: the part of space that vessels supply.
+//!
+//! A tissue answers four questions: how large it is, whether a point belongs to it, which of its points is closest to a
+//! given one, and where the next attraction point is drawn. Points, normals and lengths are in the local space of the
+//! organ's mesh ("tissue lengths").
+
+pub mod growth;
+
+pub use growth::TissueGrowth;
+
+use crate::synthesis::rng::VesselRng;
+use bevy_math::{Vec3, bounding::Aabb3d};
+use std::fmt::Debug;
+
+/// A point of a tissue, found from a point nearby.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TissuePoint {
+    /// Where it is, in tissue lengths.
+    pub position: Vec3,
+    /// Unit normal of the tissue's surface there; `Vec3::ZERO` inside a volume, where none is defined.
+    pub normal: Vec3,
+}
+
+/// How many dimensions a tissue extends in, with its size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Extent {
+    /// A curve, of this length.
+    Length(f32),
+    /// A surface, of this area in square tissue lengths.
+    Area(f32),
+    /// A solid, of this volume in cubic tissue lengths.
+    Volume(f32),
+}
+
+impl Extent {
+    /// Diameter of the segment, disc or ball of the same size, in tissue lengths.
+    ///
+    /// The settings of a preset are made for a tissue whose equivalent diameter is 1.
+    pub fn equivalent_diameter(self) -> f32 {
+        use std::f32::consts::PI;
+        match self {
+            Self::Length(length) => length,
+            Self::Area(area) => 2.0 * (area / PI).sqrt(),
+            Self::Volume(volume) => bevy_math::ops::cbrt(6.0 * volume / PI),
+        }
+    }
+}
+
+/// Space that vessels grow to supply.
+pub trait Tissue: Debug + Send + Sync {
+    /// A box that holds the whole tissue.
+    fn bounds(&self) -> Aabb3d;
+
+    /// Length, area or volume.
+    fn extent(&self) -> Extent;
+
+    /// Whether a point belongs to the tissue.
+    ///
+    /// A surface has no inside: for it this is true within a small tolerance of the surface.
+    fn contains(&self, point: Vec3) -> bool;
+
+    /// The point of the tissue nearest to `point`: `point` itself where the tissue contains it.
+    fn closest_point(&self, point: Vec3) -> TissuePoint;
+
+    /// Draws one candidate for an attraction point, uniformly by length, area or volume.
+    ///
+    /// `None` when this draw fell on nothing: beside the tissue, on a spot that its density field turned down, or on a
+    /// tissue of no size. The caller counts it as a sample all the same.
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3>;
+
+    /// The tissue in force at a growth step, for tissues that change in stages.
+    fn at_step(&self, _step: u32) -> &dyn Tissue;
+}

@@ -1,0 +1,171 @@
+//! The vessel tree: three arrays.
+//!
+//! Node `i` and the segment from its parent to it share the index `i`. Nothing that can be derived is stored: tips and
+//! roots, children and branches come from the folds in [`sweep`]. A tree may have several roots, that is, be a forest.
+
+use bevy_math::Vec3;
+
+pub mod statistics;
+pub mod sweep;
+pub mod validate;
+
+pub use validate::TreeError;
+
+/// A node of a [`VesselTree`], and the segment that ends in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct NodeId(pub u32);
+
+impl NodeId {
+    /// Position of the node in the tree's arrays.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// What [`VesselTree::parents`] holds for a root.
+pub const NO_PARENT: u32 = u32::MAX;
+
+/// The two halves of the circulation that grow together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub enum System {
+    /// Brings oxygen: grows towards oxygen drains.
+    Arterial,
+    /// Takes carbon dioxide away: grows towards the drains that an artery has supplied.
+    Venous,
+}
+
+impl System {
+    /// Both systems, in the order in which a step grows them.
+    pub const ALL: [Self; 2] = [Self::Arterial, Self::Venous];
+
+    /// 0 for arterial, 1 for venous.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Lower-case name, as used in file names and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Arterial => "arterial",
+            Self::Venous => "venous",
+        }
+    }
+}
+
+/// A tree, or forest, of vessel segments.
+///
+/// Positions and radii are in tissue lengths. A parent always stands before its children: `parents[i] < i`, so a
+/// reverse loop runs from the tips to the roots and a forward loop from the roots to the tips.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VesselTree {
+    positions: Vec<Vec3>,
+    parents: Vec<u32>,
+    radii: Vec<f32>,
+}
+
+impl VesselTree {
+    /// A tree without nodes.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A tree of given arrays, checked by [`validate`](Self::validate).
+    ///
+    /// All three have one entry per node; a root's parent is [`NO_PARENT`].
+    ///
+    /// # Errors
+    /// The first broken invariant, with the node and the value.
+    pub fn from_arrays(positions: Vec<Vec3>, parents: Vec<u32>, radii: Vec<f32>) -> Result<Self, TreeError> {
+        let tree = Self { positions, parents, radii };
+        tree.validate()?;
+        Ok(tree)
+    }
+
+    /// Number of nodes, roots included.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there is no node.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Position of every node.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// Parent of every node, [`NO_PARENT`] for a root.
+    pub fn parents(&self) -> &[u32] {
+        &self.parents
+    }
+
+    /// Radius of the segment that ends in each node; a root's is that of a parent segment under Murray's law.
+    pub fn radii(&self) -> &[f32] {
+        &self.radii
+    }
+
+    /// The parent of a node, `None` for a root.
+    ///
+    /// # Panics
+    /// When the node is not of this tree.
+    pub fn parent(&self, node: NodeId) -> Option<NodeId> {
+        let parent = self.parents[node.index()];
+        (parent != NO_PARENT).then_some(NodeId(parent))
+    }
+
+    /// The segments as `(child, parent)` index pairs, in the order of the child.
+    pub fn segments(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.parents.iter().enumerate().filter(|&(_, &parent)| parent != NO_PARENT).map(|(i, &p)| (i, p as usize))
+    }
+
+    /// The roots' indices.
+    pub fn roots(&self) -> impl Iterator<Item = usize> + '_ {
+        self.parents.iter().enumerate().filter(|&(_, &parent)| parent == NO_PARENT).map(|(i, _)| i)
+    }
+
+    /// Vector from a node's parent to the node, zero for a root.
+    pub fn segment_vector(&self, node: usize) -> Vec3 {
+        match self.parents[node] {
+            NO_PARENT => Vec3::ZERO,
+            parent => self.positions[node] - self.positions[parent as usize],
+        }
+    }
+
+    /// Appends a root.
+    pub(crate) fn push_root(&mut self, position: Vec3, radius: f32) -> NodeId {
+        self.push(position, NO_PARENT, radius)
+    }
+
+    /// Appends a node with a parent that is already there.
+    pub(crate) fn push_child(&mut self, parent: NodeId, position: Vec3, radius: f32) -> NodeId {
+        debug_assert!(parent.index() < self.len());
+        self.push(position, parent.0, radius)
+    }
+
+    fn push(&mut self, position: Vec3, parent: u32, radius: f32) -> NodeId {
+        let id = NodeId(u32::try_from(self.len()).expect("a tree holds fewer than 2^32 nodes"));
+        self.positions.push(position);
+        self.parents.push(parent);
+        self.radii.push(radius);
+        id
+    }
+
+    pub(crate) fn radii_mut(&mut self) -> &mut [f32] {
+        &mut self.radii
+    }
+
+    pub(crate) fn positions_mut(&mut self) -> &mut [Vec3] {
+        &mut self.positions
+    }
+
+    /// Empties the tree and keeps its memory.
+    pub(crate) fn clear(&mut self) {
+        self.positions.clear();
+        self.parents.clear();
+        self.radii.clear();
+    }
+}
