@@ -126,11 +126,11 @@ pub(crate) fn end_if_finished(state: &GrowthState, progress: &mut GrowthProgress
 }
 
 /// The order in which organs take turns: rising, from the one after the `last` that had one.
-fn turns<T: Ord>(mut organs: Vec<T>, last: Option<T>) -> Vec<T> {
+fn turns<T: Ord + Clone>(mut organs: Vec<T>, last: Option<T>) -> Vec<T> {
     organs.sort_unstable();
     let next = last.map_or(0, |last| organs.partition_point(|organ| *organ <= last));
-    organs.rotate_left(next % organs.len().max(1));
-    organs
+    let after = organs.split_off(next);
+    [after, organs].concat()
 }
 
 /// Gives each a step in turn as long as the budget allows. `step` says whether there are more to do for that one.

@@ -209,7 +209,7 @@ impl GrowthProgress {
             step: growth.map_or(0, Growth::steps_done),
             steps: growth.map_or(0, |growth| growth.settings().steps),
             nodes: of_systems(|growth, system| growth.tree(system).len()),
-            drains: of_systems(Growth::drains),
+            drains: of_systems(Growth::drains_left),
             grow_time,
         }
     }
