@@ -92,6 +92,11 @@ pub trait Tissue: Debug + Send + Sync {
     /// tissue of no size. The caller counts it as a sample all the same.
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3>;
 
+    /// Where vessels enter the tissue of themselves, if there is such a place: the beginning of a guide.
+    fn entrance(&self) -> Option<Vec3> {
+        None
+    }
+
     /// The tissue that takes the place of this one at a growth step, counted from 1; `None` where this one stays.
     ///
     /// Only tissues that change in stages have one. To ask for the tissue in force, call
