@@ -1,0 +1,4 @@
+//! x
+/// l
+pub struct Liver; /// s
+pub struct LiverSettings;
