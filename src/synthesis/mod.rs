@@ -1,5 +1,6 @@
 //! Everything that makes vessels, with no engine below it.
 
+mod attraction;
 pub mod colonization;
 pub mod instances;
 pub mod io;

@@ -31,3 +31,26 @@ pub struct Roots {
     /// Trees to go on growing from, beside the roots: arterial, venous.
     pub given: [Option<VesselTree>; 2],
 }
+
+/// Why roots could not be placed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RootError {}
+
+impl Roots {
+    /// Resolves.
+    pub fn resolve(
+        &self,
+        _tissue: &dyn crate::synthesis::tissue::Tissue,
+        _settings: &crate::synthesis::colonization::ColonizationSettings,
+        _seed: u64,
+    ) -> Result<[Vec<crate::synthesis::tissue::TissuePoint>; 2], RootError> {
+        let f = |p: &RootPlacement| match p {
+            RootPlacement::Exact(v) => v
+                .iter()
+                .map(|&position| crate::synthesis::tissue::TissuePoint { position, normal: Vec3::ZERO })
+                .collect(),
+            _ => vec![],
+        };
+        Ok([f(&self.arterial), f(&self.venous)])
+    }
+}

@@ -69,5 +69,7 @@ pub trait Tissue: Debug + Send + Sync {
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3>;
 
     /// The tissue in force at a growth step, for tissues that change in stages.
-    fn at_step(&self, _step: u32) -> &dyn Tissue;
+    fn at_step(&self, _step: u32) -> Option<&dyn Tissue> {
+        None
+    }
 }
