@@ -77,6 +77,12 @@ impl CentreLine {
         &self.frames
     }
 
+    /// Arc length of each sample, in metres.
+    pub fn arcs(&self) -> impl Iterator<Item = f32> {
+        let spacing = self.spacing;
+        (0..self.frames.len()).map(move |index| index as f32 * spacing)
+    }
+
     /// Arc length of the line, in metres.
     pub fn length(&self) -> f32 {
         self.frames.len().saturating_sub(1) as f32 * self.spacing

@@ -151,6 +151,6 @@ fn mix(first: [f32; 4], second: [f32; 4], amount: f32) -> [f32; 4] {
 
 /// Smooth step from 0 at `low` to 1 at `high`.
 fn smooth_step(low: f32, high: f32, value: f32) -> f32 {
-    let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    let share = ((value - low) / (high - low).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
     share * share * (3.0 - 2.0 * share)
 }

@@ -29,7 +29,9 @@ impl Noise {
 
     /// Three octaves in [−1, 1], each half as wide and half as strong as the one before.
     pub fn rough(self, point: Vec3) -> f32 {
-        (self.at(point) + 0.5 * self.at(point * 2.0 + Vec3::splat(17.0)) + 0.25 * self.at(point * 4.0 - Vec3::splat(5.0)))
+        (self.at(point)
+            + 0.5 * self.at(point * 2.0 + Vec3::splat(17.0))
+            + 0.25 * self.at(point * 4.0 - Vec3::splat(5.0)))
             / 1.75
     }
 

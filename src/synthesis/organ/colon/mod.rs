@@ -169,11 +169,11 @@ pub struct Colon {
     pub roots: RootSites,
     /// Where vessels reach the inner side: under the taenia at the mesenteric border.
     pub inner_roots: RootSites,
-    /// From the front, the whole organ in view.
+    /// From the front, the whole organ in view of a camera with a vertical field of view of 45°.
     pub front: Viewpoint,
     /// From before the cut end into the lumen.
     pub rim: Viewpoint,
-    /// From within the transverse colon, along it.
+    /// From within the lumen, along its straightest part: what an endoscope sees.
     pub lumen: Viewpoint,
 }
 
@@ -200,7 +200,8 @@ fn build(settings: &ColonSettings) -> Colon {
     let outer_rings = ((rings as f32 * outer.length / length) as usize).max(8);
     let inner_rings = rings.saturating_sub(outer_rings + RIM_RINGS).max(8);
 
-    let mut sequence: Vec<Ring> = outer.arcs(outer_rings).map(|arc| Ring { side: Side::Outer, arc, across_rim: 0.0 }).collect();
+    let mut sequence: Vec<Ring> =
+        outer.arcs(outer_rings).map(|arc| Ring { side: Side::Outer, arc, across_rim: 0.0 }).collect();
     sequence.extend((1..=RIM_RINGS).map(|k| Ring {
         side: Side::Inner,
         arc: wall.end,
@@ -350,13 +351,11 @@ fn describe(wall: &Wall, mesh: OrganMesh, outer: Range<usize>, inner: Range<usiz
     let centre = 0.5 * (low + high);
     let height = high.y - low.y;
     let end = wall.line.at(wall.end);
-    let along = |arc: f32| wall.line.at(arc);
-    let (eye, target) = (along(wall.apex + 0.47 * (wall.end - wall.apex)), along(wall.apex + 0.53 * (wall.end - wall.apex)));
     Colon {
         outer,
         inner,
         centre_line: wall.line.frames().iter().map(|frame| frame.centre).collect(),
-        radii: wall.line.frames().iter().map(|frame| frame.radius).collect(),
+        radii: wall.line.arcs().map(|arc| wall.mean_radius(Side::Outer, arc)).collect(),
         haustra: wall.rows.iter().map(haustra::Row::len).sum(),
         roots: root_sites(wall, Side::Outer, 12),
         inner_roots: root_sites(wall, Side::Inner, 24),
@@ -366,9 +365,25 @@ fn describe(wall: &Wall, mesh: OrganMesh, outer: Range<usize>, inner: Range<usiz
             target: end.centre - end.tangent * end.radius,
             up: Vec3::Y,
         },
-        lumen: Viewpoint { eye: eye.centre, target: target.centre, up: Vec3::Y },
+        lumen: lumen_view(wall),
         mesh,
     }
+}
+
+/// The view along the straightest and widest part of the lumen.
+fn lumen_view(wall: &Wall) -> Viewpoint {
+    const CANDIDATES: usize = 60;
+    let ahead = 0.15 * (wall.end - wall.apex);
+    let candidates = (1..CANDIDATES).map(|index| {
+        let arc = wall.apex + ahead + (wall.end - wall.apex - ahead) * index as f32 / CANDIDATES as f32;
+        let (here, there) = (wall.line.at(arc), wall.line.at(arc - ahead));
+        let straight = here.centre.distance(there.centre) / ahead;
+        (straight * straight * straight * here.radius, here.centre, there.centre)
+    });
+    let best = candidates.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, Vec3::ZERO, Vec3::Y));
+    // Along a vertical limb the front of the body is at the top of the picture.
+    let level = (best.2 - best.1).normalize_or(Vec3::X).y.abs() < 0.8;
+    Viewpoint { eye: best.1, target: best.2, up: if level { Vec3::Y } else { Vec3::Z } }
 }
 
 /// Places along the mesenteric border, arteries and veins beside each other.

@@ -31,7 +31,7 @@ const TAENIA_RIDGE: f32 = 0.022;
 /// How far a semilunar fold stands into the lumen, relative to the mean radius.
 const FOLD: f32 = 0.26;
 /// Half width of a semilunar fold's crest, in metres.
-const FOLD_WIDTH: f32 = 0.0042;
+const FOLD_WIDTH: f32 = 0.0046;
 
 /// Which side of the wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ impl Wall {
         let unit = settings.width / ColonSettings::DEFAULT_WIDTH;
         let cap = 0.95 * line.at(apex + 0.05 * unit).radius;
         let end = line.length();
-        
+
         let rows = haustra::rows(&line, apex + 0.3 * cap, end - 0.02 * unit, settings.haustrum_length, rng);
         use rand::Rng;
         Self {
