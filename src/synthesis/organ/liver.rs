@@ -143,6 +143,10 @@ struct Field {
 }
 
 impl Field {
+    /// Most steps along a ray, and how near the surface it ends, in metres.
+    const TRACE_STEPS: usize = 48;
+    const TRACE_TOLERANCE: f32 = 2e-5;
+
     fn new(variation: f32, rng: &mut VesselRng) -> Self {
         let shapes = SHAPES
             .iter()
@@ -178,9 +182,9 @@ impl Field {
     /// The surface along a unit direction from the middle, found by sphere tracing from within.
     fn surface(&self, direction: Vec3) -> Vec3 {
         let mut reach = 0.01;
-        for _ in 0..48 {
+        for _ in 0..Self::TRACE_STEPS {
             let field = self.at(MIDDLE + direction * reach);
-            if field > -2e-5 {
+            if field > -Self::TRACE_TOLERANCE {
                 break;
             }
             reach -= 0.8 * field;
@@ -250,7 +254,7 @@ fn chart(direction: Vec3) -> Vec2 {
 
 /// Moves the rays so that the triangles on the surface become more equal: a few rounds of Laplacian smoothing there.
 fn even_out(directions: &mut [Vec3], triangles: &[[u32; 3]], surface: &impl Fn(Vec3) -> Vec3) {
-    const ROUNDS: usize = 6;
+    const ROUNDS: usize = 4;
     let mut sums = vec![(Vec3::ZERO, 0.0f32); directions.len()];
     for _ in 0..ROUNDS {
         let points: Vec<Vec3> = directions.iter().map(|&direction| surface(direction)).collect();

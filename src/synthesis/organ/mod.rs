@@ -16,6 +16,7 @@ mod noise;
 pub use colon::{Colon, ColonSettings};
 pub use liver::{Liver, LiverSettings};
 
+use crate::synthesis::mesh::{MeshError, TriangleMesh};
 use bevy_math::{Vec2, Vec3};
 use std::ops::Range;
 
@@ -60,6 +61,14 @@ impl OrganMesh {
         }
         part.triangles = chosen.iter().map(|corners| corners.map(|corner| index[corner as usize])).collect();
         part
+    }
+
+    /// The triangles as every stage reads them, UVs included.
+    ///
+    /// # Errors
+    /// Those of [`TriangleMesh::new`], which no mesh of a generator or part of it meets, unless it is an empty part.
+    pub fn triangle_mesh(&self) -> Result<TriangleMesh, MeshError> {
+        TriangleMesh::new(self.positions.clone(), self.triangles.clone(), Some(self.uvs.clone()))
     }
 
     /// Volume that the surface encloses, in cubic metres; negative when it is inside out. Meaningful for closed meshes.

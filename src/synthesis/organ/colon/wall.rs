@@ -215,3 +215,29 @@ fn smooth_max(a: f32, b: f32, blend: f32) -> f32 {
     let near = (blend - (a - b).abs()).max(0.0) / blend.max(f32::MIN_POSITIVE);
     a.max(b) + 0.25 * near * near * blend
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesis::rng::Stream;
+
+    #[test]
+    fn the_wall_has_a_thickness_everywhere_and_stays_within_its_clearance() {
+        for seed in 0..6 {
+            let settings = ColonSettings { seed, ..Default::default() };
+            let wall = Wall::new(&settings, &mut Stream::Organ.rng(seed));
+            let start = wall.start(Side::Inner);
+            for place in 1..400 {
+                let arc = start + (wall.end - start) * place as f32 / 400.0;
+                let [outer, inner] = [Side::Outer, Side::Inner].map(|side| wall.section(side, arc));
+                for angle in (0..60).map(|step| TAU * step as f32 / 60.0) {
+                    let outside = wall.radius(Side::Outer, &outer, angle);
+                    let inside = wall.radius(Side::Inner, &inner, angle);
+                    assert!(outside - inside > 0.4 * settings.wall_thickness, "seed {seed}, arc {arc}, angle {angle}");
+                    assert!(outside < CLEARANCE * outer.mean, "seed {seed}: {} at arc {arc}", outside / outer.mean);
+                    assert!(inside >= 0.0);
+                }
+            }
+        }
+    }
+}
