@@ -60,7 +60,7 @@ pub(super) fn rows(line: &CentreLine, from: f32, to: f32, length: f32, rng: &mut
         for row in &mut rows {
             let fold = arc + local * rng.random_range(-0.26..=0.26);
             let missing = rng.random_bool(0.06);
-            let bulge = rng.random_range(0.78..=1.16);
+            let bulge = rng.random_range(0.78..=1.12);
             let clear = row.folds.last().is_none_or(|last| fold - last > SHORTEST * local);
             if clear && !missing && fold < to {
                 row.folds.push(fold);

@@ -21,7 +21,7 @@ use bevy_math::{Vec3, ops};
 use std::f32::consts::{PI, TAU};
 
 /// Room that the wall may take, as a multiple of the mean radius: the outermost bulge.
-pub(super) const CLEARANCE: f32 = 1.2;
+pub(super) const CLEARANCE: f32 = 1.26;
 
 /// Radii relative to the mean radius, where haustra are as deep as the settings' default.
 const TAENIA: f32 = 0.93;
