@@ -16,6 +16,8 @@ mod parallel;
 mod perception;
 pub mod settings;
 mod system_growth;
+#[cfg(test)]
+mod tests;
 
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
