@@ -67,7 +67,8 @@ fn a_growth_without_samples_or_drains_rests() {
 
 /// A growth whose only drains are these.
 fn pulled_by(drains: &[Vec3], change: impl Fn(&mut ColonizationSettings)) -> Growth {
-    let mut settings = ColonizationSettings { samples: 0, steps: 40, confine: false, ..ColonizationSettings::default() };
+    let mut settings =
+        ColonizationSettings { samples: 0, steps: 40, confine: false, ..ColonizationSettings::default() };
     change(&mut settings);
     let mut growth = growth(settings);
     growth.systems[0].receive(drains);
