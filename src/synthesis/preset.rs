@@ -179,7 +179,7 @@ impl PresetName {
     pub fn ron(self) -> &'static str {
         macro_rules! file {
             ($name:literal) => {
-                include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/presets/", $name, ".ron"))
+                include_str!(concat!("../../assets/presets/", $name, ".ron"))
             };
         }
         match self {

@@ -40,6 +40,9 @@ fn association_equals_its_brute_force_twin_at_every_step() {
     let swinging = TissueGrowth::from_fn(30, |step| if step % 7 < 4 { 1.0 + 0.1 * step as f32 } else { 1.0 });
     for (case, tissue) in [disc(), disc(), ball].into_iter().enumerate() {
         let mut settings = ColonizationSettings { steps: 30, samples: 300, ..ColonizationSettings::default() };
+        if case == 2 {
+            settings = settings.scaled(2.0);
+        }
         if case == 1 {
             settings.arterial.tissue_growth = swinging.clone();
             settings.arterial.lateral_sprouts = false;
@@ -52,7 +55,7 @@ fn association_equals_its_brute_force_twin_at_every_step() {
                 system.assert_association_exact();
             }
         }
-        assert!(growth.tree(System::Arterial).len() > 100);
+        assert!(growth.tree(System::Arterial).len() > 20, "case {case}: {}", growth.tree(System::Arterial).len());
     }
 }
 
@@ -62,7 +65,7 @@ fn a_growth_without_samples_or_drains_rests() {
     growth.run();
     assert_eq!(growth.tree(System::Arterial).len(), 1);
     assert_eq!(growth.steps_done(), 100);
-    assert_eq!(growth.step().systems, Default::default());
+    assert_eq!(growth.step().systems, [SystemReport::default(); 2]);
 }
 
 /// A growth whose only drains are these.
