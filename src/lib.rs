@@ -56,6 +56,22 @@ pub mod plugin;
 #[cfg(feature = "render")]
 pub mod render;
 
+/// What most apps with vessels name: `use bevy_vessels::prelude::*`.
+#[cfg(feature = "plugin")]
+pub mod prelude {
+    pub use crate::VesselPlugin;
+    pub use crate::plugin::{
+        EntityCommandsExt, GrowthAction, GrowthBudget, GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished,
+        GrowthPhase, GrowthProgress, OrganVessels, SegmentColoring, Vasculature, VesselAppearance, VesselSystem,
+        Vessels,
+    };
+    pub use crate::synthesis::colonization::ColonizationSettings;
+    pub use crate::synthesis::preset::PresetName;
+    pub use crate::synthesis::roots::RootPlacement;
+    pub use crate::synthesis::tissue::{TissueMode, TissueSettings};
+    pub use crate::synthesis::tree::System;
+}
+
 #[cfg(feature = "plugin")]
 use bevy::app::{App, Plugin};
 
