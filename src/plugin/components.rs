@@ -59,7 +59,7 @@ pub struct Vasculature {
 impl Vasculature {
     /// The vessels of a named preset, with seed 0, fitted to the organ.
     pub fn new(preset: PresetName) -> Self {
-        Self::from_preset(preset.preset())
+        Self::from_preset(preset.load())
     }
 
     /// The vessels of a preset, such as one read from a file, with seed 0, fitted to the organ.
@@ -70,7 +70,7 @@ impl Vasculature {
             arterial_roots: preset.arterial_roots,
             venous_roots: preset.venous_roots,
             tissue: preset.tissue,
-            fit: true,
+            fit: preset.fit,
         }
     }
 

@@ -16,6 +16,8 @@ mod parallel;
 mod perception;
 pub mod settings;
 mod system_growth;
+#[cfg(test)]
+mod tests;
 
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
@@ -277,7 +279,7 @@ impl Growth {
 }
 
 fn ground<'a>(tissue: &'a dyn Tissue, settings: &ColonizationSettings, step: u32) -> Ground<'a> {
-    let tissue = tissue.at_step(step).unwrap_or(tissue);
+    let tissue = tissue.at_step(step);
     let surface = matches!(tissue.extent(), Extent::Area(_));
     Ground { tissue, confine: settings.confine, normals: settings.stand_off && surface }
 }

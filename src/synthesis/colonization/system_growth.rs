@@ -7,6 +7,8 @@ use super::lengths::Lengths;
 use super::perception::{self, Pull, Search};
 use super::settings::SystemSettings;
 use crate::synthesis::attraction::Drains;
+#[cfg(test)]
+use crate::synthesis::attraction::Nearest;
 use crate::synthesis::tissue::{Tissue, TissuePoint};
 use crate::synthesis::tree::{NO_PARENT, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d};
@@ -218,56 +220,41 @@ impl SystemGrowth {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::synthesis::attraction::Nearest;
-    use crate::synthesis::murray;
-
-    // Kept beside the step because it looks at what is private to it.
-    /// The brute-force twin of an association: every drain against every node.
-    fn brute_pulls(system: &SystemGrowth) -> Vec<(u32, Option<u32>)> {
-        let positions = system.forest.tree.positions();
-        let nearest = |drain: u32| {
-            let at = system.drains.position(drain);
-            let reach = system.lengths.influence * system.lengths.influence;
-            (0..positions.len() as u32)
-                .filter(|&node| perception::is_open(&system.forest, &system.lengths, node))
+impl SystemGrowth {
+    /// Compares what the drains know of their nearest open node with every drain asking every node.
+    pub(crate) fn assert_association_exact(&mut self) {
+        perception::associate(&self.forest, &self.lengths, &mut self.drains, &mut self.search, &mut self.pulls);
+        let positions = self.forest.tree.positions();
+        let reach = self.lengths.influence * self.lengths.influence;
+        for drain in self.drains.slots() {
+            let at = self.drains.position(drain);
+            let nearest = (0..positions.len() as u32)
+                .filter(|&node| perception::is_open(&self.forest, &self.lengths, node))
                 .map(|node| (positions[node as usize].distance_squared(at), node))
                 .filter(|&(distance, _)| distance <= reach)
-                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-                .map(|(_, node)| node)
-        };
-        system.drains.slots().map(|drain| (drain, nearest(drain))).collect()
-    }
-
-    pub(crate) fn assert_association_exact(system: &mut SystemGrowth) {
-        let expected = brute_pulls(system);
-        perception::associate(
-            &system.forest,
-            &system.lengths,
-            &mut system.drains,
-            &mut system.search,
-            &mut system.pulls,
-        );
-        let reach = system.lengths.influence * system.lengths.influence;
-        for (drain, node) in expected {
-            let known = match system.drains.nearest(drain) {
-                Nearest::Node(node, distance) if distance <= reach => Some(node),
+                .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let known = match self.drains.nearest(drain) {
+                Nearest::Node(node, distance) if distance <= reach => Some((distance, node)),
                 _ => None,
             };
-            assert_eq!(known, node, "drain {drain}");
+            assert_eq!(known, nearest, "drain {drain}");
         }
     }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesis::murray;
 
     #[test]
-    fn murray_radii_of_a_planted_tree_come_from_its_tips() {
+    fn radii_of_a_tree_come_from_its_tips() {
         let settings = SystemSettings::default();
-        let bounds = Aabb3d::new(Vec3::ZERO, Vec3::ONE);
-        let mut system = SystemGrowth::new(&settings, &bounds);
-        system.forest.add_root(TissuePoint { position: Vec3::ZERO, normal: Vec3::ZERO }, 0.01);
+        let mut system = SystemGrowth::new(&settings, &Aabb3d::new(Vec3::ZERO, Vec3::ONE));
+        let at = |x: f32| TissuePoint { position: Vec3::X * x, normal: Vec3::ZERO };
+        system.forest.add_root(at(0.0), 0.01);
         for (parent, x) in [(0, 0.1), (1, 0.2), (1, 0.3)] {
-            let at = TissuePoint { position: Vec3::X * x, normal: Vec3::ZERO };
-            system.forest.add_child(parent, at, 0.01, 0);
+            system.forest.add_child(parent, at(x), 0.01, 0);
         }
         system.forest.sweep(0);
         let radii = system.forest.tree.radii();
