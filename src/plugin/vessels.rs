@@ -5,11 +5,7 @@ use crate::synthesis::{
     colonization::Growth,
     tree::{NO_PARENT, NodeId, System, VesselTree},
 };
-use bevy::{
-    camera::primitives::Aabb,
-    ecs::component::Component,
-    math::Vec3,
-};
+use bevy::{camera::primitives::Aabb, ecs::component::Component, math::Vec3};
 
 /// The vessels of one system of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
 /// off its surface where the settings say so.

@@ -49,8 +49,11 @@ fn bad_meshes() -> Vec<(&'static str, Mesh)> {
         ("NaN", list(with_nan)),
         ("no area", list(vec![[1.0; 3]; 3])),
         ("index out of range", list(corners.clone()).with_inserted_indices(Indices::U16(vec![0, 1, 9]))),
-        ("lines", Mesh::new(PrimitiveTopology::LineList, RenderAssetUsages::default())
-            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, corners)),
+        (
+            "lines",
+            Mesh::new(PrimitiveTopology::LineList, RenderAssetUsages::default())
+                .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, corners),
+        ),
         ("on the graphics card", on_gpu),
     ]
 }

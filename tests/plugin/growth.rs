@@ -1,9 +1,7 @@
 //! An organ grows, and obeys.
 
 use crate::*;
-use bevy_vessels::plugin::{
-    EntityCommandsExt, GrowthControl, GrowthFinished, GrowthFrame, GrowthStarted, diagnostics,
-};
+use bevy_vessels::plugin::{EntityCommandsExt, GrowthControl, GrowthFinished, GrowthFrame, GrowthStarted, diagnostics};
 
 #[test]
 fn an_organ_grows_over_frames_and_finishes() {
@@ -149,7 +147,9 @@ fn diagnostics_are_measured() {
     let mut app = headless(GrowthBudget::Steps(2));
     let organ = spawn(&mut app, quick());
     run_until(&mut app, "steps", |world| progress(world, organ).step > 5);
-    let measured = |path: &DiagnosticPath| app.world().resource::<DiagnosticsStore>().get_measurement(path).map(|found| found.value);
+    let measured = |path: &DiagnosticPath| {
+        app.world().resource::<DiagnosticsStore>().get_measurement(path).map(|found| found.value)
+    };
     assert_eq!(measured(&diagnostics::STEPS), Some(2.0));
     assert_eq!(app.world().resource::<GrowthFrame>().steps, 2);
     let nodes = progress(app.world(), organ).nodes.iter().sum::<usize>();

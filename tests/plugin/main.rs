@@ -25,19 +25,13 @@ use std::{
 };
 
 /// Steps of the growths in these tests.
-const STEPS: u32 = 25;
+const STEPS: u32 = 30;
 
 /// An app as small as vessels allow.
 fn headless(budget: GrowthBudget) -> App {
     let mut app = App::new();
     let growth = GrowthPlugin::default().with_budget(budget);
-    app.add_plugins((
-        MinimalPlugins,
-        AssetPlugin::default(),
-        MeshPlugin,
-        TransformPlugin,
-        VesselPlugin { growth },
-    ));
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, VesselPlugin { growth }));
     app.finish();
     app.cleanup();
     app
@@ -46,9 +40,9 @@ fn headless(budget: GrowthBudget) -> App {
 /// Vessels that grow quickly.
 fn quick() -> Vasculature {
     let mut vasculature = Vasculature::new(PresetName::Paper)
-        .with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::Nearest(vec![Vec3::NEG_Y]));
+        .with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::Beside);
     vasculature.settings.steps = STEPS;
-    vasculature.settings.samples = 200;
+    vasculature.settings.samples = 500;
     vasculature
 }
 
