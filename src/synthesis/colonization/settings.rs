@@ -137,8 +137,9 @@ impl SystemSettings {
     pub const DEFAULT_BIFURCATION_EXPONENT: f32 = 2.55;
     /// Venous influence distance, as a multiple of the arterial one, that keeps the venous tree from stalling.
     ///
-    /// The drains handed over lie where the arteries were, which the veins reach only from further away.
-    pub const DEFAULT_VENOUS_INFLUENCE_FACTOR: f32 = 1.5;
+    /// The drains handed over lie where the arteries were, which the veins reach only from further away. At 1 most venous
+    /// trees stall, at 1.5 some of a hundred do, at 2 none.
+    pub const DEFAULT_VENOUS_INFLUENCE_FACTOR: f32 = 2.0;
 
     /// Multiplies every length by `factor`. Angles, weights and exponents stay.
     pub fn scale_lengths(&mut self, factor: f32) {

@@ -20,6 +20,7 @@ pub mod bvh;
 mod error;
 pub mod growth;
 mod orientation;
+pub mod settings;
 pub mod shape;
 pub mod surface;
 pub mod triangle;
@@ -28,6 +29,7 @@ mod voxels;
 
 pub use error::TissueError;
 pub use growth::TissueGrowth;
+pub use settings::{TissueMode, TissueSettings};
 pub use shape::{Ball, Cuboid, Disc, Ellipsoid, Rectangle};
 pub use surface::MeshSurface;
 pub use triangle::{SurfacePoint, TriangleIndex};
