@@ -4,10 +4,12 @@
 //! axis; the rings where the cone touches the spheres are shared, so normals are smooth all over. Tubes of neighbouring
 //! segments overlap at their common node, which hides the joint. One vessel is thus many closed pieces, not one surface.
 
+use super::{WriteError, write_atomically};
 use crate::synthesis::tree::{System, VesselTree};
 use bevy_math::{Vec3, ops};
 use std::f32::consts::{PI, TAU};
 use std::io::{self, ErrorKind, Write};
+use std::path::Path;
 
 /// How a segment begins: with its parent's radius, but with no more than this multiple of its own, so that a thin side
 /// branch does not begin as a thorn as wide as its trunk.
@@ -45,6 +47,18 @@ impl Default for ObjOptions {
     fn default() -> Self {
         Self { sides: Self::DEFAULT_SIDES, cap_rings: Self::DEFAULT_CAP_RINGS }
     }
+}
+
+/// Writes the segments of one or more trees to an OBJ file, whole or not at all. See [`write_obj`].
+///
+/// # Errors
+/// Those of [`write_atomically`], and more vertices than [`write_obj`] can number.
+pub fn save_obj(
+    path: impl AsRef<Path>,
+    trees: &[(System, &VesselTree)],
+    options: &ObjOptions,
+) -> Result<(), WriteError> {
+    write_atomically(path, |out| write_obj(out, trees, options))
 }
 
 /// Writes the segments of one or more trees as OBJ, one group (`g arterial`) per tree, in tissue lengths.
