@@ -2,11 +2,8 @@
 
 use bevy_math::{Vec3, vec3};
 use bevy_vessels::synthesis::io::{
-    WriteError,
-    csv::{save_csv, write_csv},
-    obj::{ObjOptions, save_obj, write_obj},
-    swc::{ReadError, SwcOptions, SwcReadOptions, load_swc, read_swc, save_swc, write_swc},
-    write_atomically,
+    ObjOptions, ReadError, SwcOptions, SwcReadOptions, WriteError, load_swc, read_swc, save_csv, save_obj, save_swc,
+    write_atomically, write_csv, write_obj, write_swc,
 };
 use bevy_vessels::synthesis::rng::Stream;
 use bevy_vessels::synthesis::tree::{NO_PARENT, System, VesselTree};

@@ -26,7 +26,7 @@
 //! ```
 //! use bevy_vessels::synthesis::{
 //!     colonization::{ColonizationSettings, Growth},
-//!     io::swc::{SwcOptions, save_swc},
+//!     io::{SwcOptions, save_swc},
 //!     roots::Roots,
 //!     tissue::{Disc, Tissue},
 //!     tree::System,

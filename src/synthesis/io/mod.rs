@@ -1,11 +1,11 @@
 //! Files: trees are written as SWC, OBJ and CSV, and read from SWC.
 //!
-//! Every format is a module with a function that writes to any [`std::io::Write`], such as [`swc::write_swc`], and one
-//! that writes a file, such as [`swc::save_swc`]. Files are there whole or not at all, by [`write_atomically`].
+//! Every format has a function that writes to any [`std::io::Write`], such as [`write_swc`], and one that writes a file,
+//! such as [`save_swc`]. Files are there whole or not at all, by [`write_atomically`].
 //!
 //! ```
 //! use bevy_vessels::synthesis::{
-//!     io::swc::{SwcOptions, SwcReadOptions, load_swc, save_swc},
+//!     io::{SwcOptions, SwcReadOptions, load_swc, save_swc},
 //!     tree::{NO_PARENT, VesselTree},
 //! };
 //! use bevy_math::Vec3;
@@ -24,9 +24,13 @@
 //! back, so the same tree gives the same bytes everywhere.
 
 mod atomic;
-pub mod csv;
-pub mod obj;
-pub mod swc;
+mod csv;
+mod obj;
+mod swc;
 mod swc_read;
 
 pub use atomic::{WriteError, write_atomically};
+pub use csv::{save_csv, write_csv};
+pub use obj::{ObjOptions, save_obj, write_obj};
+pub use swc::{SwcOptions, save_swc, write_swc};
+pub use swc_read::{ReadError, SwcReadOptions, load_swc, read_swc};

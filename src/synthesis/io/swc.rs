@@ -4,8 +4,6 @@
 //! Source: Cannon, Turner, Pyapali & Wheal, "An on-line archive of reconstructed hippocampal neurons" (1998), and the
 //! SWCplus specification (neuroinformatics.nl/swcPlus). A file may have several roots.
 
-pub use super::swc_read::{ReadError, SwcReadOptions, load_swc, read_swc};
-
 use super::{WriteError, write_atomically};
 use crate::synthesis::tree::{NO_PARENT, VesselTree};
 use std::io::{self, Write};

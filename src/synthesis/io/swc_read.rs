@@ -1,4 +1,4 @@
-//! Reading SWC. The format is described in [`super::swc`].
+//! Reading SWC. The format is described in `swc.rs`.
 
 use crate::synthesis::tree::{NO_PARENT, TreeError, VesselTree};
 use bevy_math::Vec3;
