@@ -212,7 +212,7 @@ fn least_radius_lifts_what_is_too_thin() {
     }
 }
 
-/// Nodes, roots, leaves and total length of the vessels that are shared for tests, and N_k where they are trees.
+/// Nodes, roots, leaves and total length of the vessels that are shared for tests, and `N_k` where they are trees.
 #[test]
 fn real_vessels_come_back_and_have_the_published_statistics() {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/vessels"));

@@ -141,7 +141,7 @@ impl Template {
 
     /// Angle between the axis and the normals on a ring, counted from 1 at the far pole.
     ///
-    /// The cone touches both spheres where its normal has the part (r_start − r_end) / length along the axis. Up to there
+    /// The cone touches both spheres where its normal has the part `(r_start − r_end) / length` along the axis. Up to there
     /// the rings lie on the far sphere, from there on the near one. Spheres alone have their rings spread evenly.
     fn colatitude(&self, ring: usize, length: f32, taper: f32) -> f32 {
         let rings = self.cap_rings as f32;

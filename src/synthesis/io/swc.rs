@@ -2,7 +2,7 @@
 //!
 //! Columns `id type x y z radius parent`, ids from 1, parent -1 for a root; lines that begin with `#` are comments.
 //! Source: Cannon, Turner, Pyapali & Wheal, "An on-line archive of reconstructed hippocampal neurons" (1998), and the
-//! SWCplus specification (neuroinformatics.nl/swcPlus). A file may have several roots.
+//! `SWCplus` specification (neuroinformatics.nl/swcPlus). A file may have several roots.
 
 use super::{WriteError, write_atomically};
 use crate::synthesis::tree::{NO_PARENT, VesselTree};
