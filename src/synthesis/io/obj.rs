@@ -5,15 +5,12 @@
 //! segments overlap at their common node, which hides the joint. One vessel is thus many closed pieces, not one surface.
 
 use super::{WriteError, write_atomically};
+use crate::synthesis::instances::MAX_FLARE;
 use crate::synthesis::tree::{System, VesselTree};
 use bevy_math::{Vec3, ops};
 use std::f32::consts::{PI, TAU};
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
-
-/// How a segment begins: with its parent's radius, but with no more than this multiple of its own, so that a thin side
-/// branch does not begin as a thorn as wide as its trunk.
-const MAX_FLARE: f32 = 1.3;
 
 /// How finely segments are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +60,8 @@ pub fn save_obj(
 
 /// Writes the segments of one or more trees as OBJ, one group (`g arterial`) per tree, in tissue lengths.
 ///
-/// Triangles are oriented outwards and every vertex has its normal. A segment within the sphere of one of its ends is
+/// A segment begins with its parent's radius, but with no more than [`MAX_FLARE`] times its own. Triangles are oriented
+/// outwards and every vertex has its normal. A segment within the sphere of one of its ends is
 /// drawn as that sphere.
 ///
 /// # Errors
