@@ -77,7 +77,7 @@ impl TriangleMesh {
         Welding { vertices, count: firsts.len() }
     }
 
-    /// A copy in which every position occurs once and no triangle is degenerate.
+    /// A copy in which every position occurs once, and no triangle is degenerate or repeats an earlier one.
     ///
     /// Texture coordinates are dropped: a welded vertex of a seam would need several.
     #[must_use]
@@ -87,11 +87,11 @@ impl TriangleMesh {
         for (vertex, &position) in self.positions().iter().enumerate() {
             positions[welding.vertex(vertex as u32)] = position;
         }
-        let triangles = (0..self.triangles().len())
+        let triangles: Vec<[u32; 3]> = (0..self.triangles().len())
             .filter(|&triangle| !self.is_degenerate(triangle))
             .map(|triangle| self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32))
             .collect();
-        Self { positions, triangles, uvs: None }
+        Self { positions, triangles: without_repeats(triangles), uvs: None }
     }
 
     /// The welded edges of the mesh, for every question about how it hangs together.
@@ -268,6 +268,28 @@ pub(crate) struct Patches {
     pub of_triangle: Vec<Option<u32>>,
     /// Number of parts.
     pub count: usize,
+}
+
+/// Drops triangles whose three vertices an earlier triangle has too, in whichever order.
+fn without_repeats(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    let mut keys: Vec<([u32; 3], u32)> = triangles
+        .iter()
+        .enumerate()
+        .map(|(number, &corners)| {
+            let mut sorted = corners;
+            sorted.sort_unstable();
+            (sorted, number as u32)
+        })
+        .collect();
+    keys.sort_unstable();
+    let mut repeats: Vec<u32> = keys.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect();
+    repeats.sort_unstable();
+    let mut number = 0;
+    triangles.retain(|_| {
+        number += 1;
+        repeats.binary_search(&(number - 1)).is_err()
+    });
+    triangles
 }
 
 fn hash(position: Vec3) -> u64 {

@@ -23,6 +23,31 @@ pub enum TissueError {
         /// The value found.
         value: f32,
     },
+    /// A voxel grid without voxels.
+    #[error("the resolution is 0; it must be at least 1 voxel along the longest side, 128 is usual")]
+    NoResolution,
+    /// More voxels than fit into memory.
+    #[error("a resolution of {resolution} takes {voxels} voxels, more than 67108864; lower it")]
+    TooManyVoxels {
+        /// Voxels along the longest side.
+        resolution: u32,
+        /// All voxels.
+        voxels: f64,
+    },
+    /// Large triangles in numbers that fill space instead of surrounding it.
+    #[error("the triangles touch the voxels in more than {limit} places; lower the resolution, or repair the mesh")]
+    TooManyTouches {
+        /// The largest number of places.
+        limit: usize,
+    },
+    /// A mesh that has no inside, such as a sheet.
+    #[error(
+        "no part of the mesh's box is enclosed by it at a resolution of {resolution}; close its holes, or grow on the surface instead"
+    )]
+    NoInside {
+        /// Voxels along the longest side.
+        resolution: u32,
+    },
     /// Sides of a rectangle that are not perpendicular.
     #[error("the sides of the rectangle meet at an angle with cosine {cosine}; they must be perpendicular")]
     NotPerpendicular {

@@ -19,10 +19,13 @@
 pub mod bvh;
 mod error;
 pub mod growth;
+mod orientation;
 pub mod settings;
 pub mod shape;
 pub mod surface;
 pub mod triangle;
+pub mod volume;
+mod voxels;
 
 pub use error::TissueError;
 pub use growth::TissueGrowth;
@@ -30,6 +33,7 @@ pub use settings::{TissueMode, TissueSettings};
 pub use shape::{Ball, Cuboid, Disc, Ellipsoid, Rectangle};
 pub use surface::MeshSurface;
 pub use triangle::{SurfacePoint, TriangleIndex};
+pub use volume::MeshVolume;
 
 use crate::synthesis::rng::VesselRng;
 use bevy_math::{Vec3, bounding::Aabb3d};
