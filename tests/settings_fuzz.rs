@@ -19,7 +19,7 @@ use std::{
 
 const SETTINGS: u64 = 1000;
 const MOST_STEPS: u32 = 40;
-const MOST_SAMPLES: u32 = 400;
+const MOST_SAMPLES: u32 = 800;
 /// Far more than the slowest growth takes, on any machine.
 const HANGS_AFTER: Duration = Duration::from_secs(120);
 
@@ -32,12 +32,12 @@ enum Lengths {
 
 impl Lengths {
     fn new(rng: &mut VesselRng) -> Self {
-        if rng.random_bool(0.6) { Self::About(rng.random_range(-2.0..-0.5)) } else { Self::Any }
+        if rng.random_bool(0.6) { Self::About(rng.random_range(-1.7..-0.6)) } else { Self::Any }
     }
 
     fn length(self, rng: &mut VesselRng) -> f32 {
         let exponent = match self {
-            Self::About(exponent) => exponent + rng.random_range(-0.4..0.4),
+            Self::About(exponent) => exponent + rng.random_range(-0.3..0.3),
             Self::Any if rng.random_bool(0.9) => rng.random_range(-3.5..0.5),
             Self::Any => rng.random_range(-37.0..37.0),
         };
@@ -198,5 +198,5 @@ fn a_thousand_random_settings_neither_panic_nor_hang() {
     }
     println!("{grew} grew more than 10 nodes, {rejected} were rejected");
     assert!(panicked.is_empty(), "the settings of these seeds panic, see above: {panicked:?}");
-    assert!(grew > 300 && rejected > 200, "too few settings say anything: {grew} grew, {rejected} were rejected");
+    assert!(grew > 120 && rejected > 200, "too few settings say anything: {grew} grew, {rejected} were rejected");
 }
