@@ -39,8 +39,8 @@ fn headless(budget: GrowthBudget) -> App {
 
 /// Vessels that grow quickly.
 fn quick() -> Vasculature {
-    let mut vasculature = Vasculature::new(PresetName::Paper)
-        .with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::Beside);
+    let mut vasculature =
+        Vasculature::new(PresetName::Paper).with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::Beside);
     vasculature.settings.steps = STEPS;
     vasculature.settings.samples = 500;
     vasculature
