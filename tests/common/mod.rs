@@ -19,8 +19,8 @@ pub struct Case {
 
 impl Case {
     fn new(name: &'static str, tissue: impl Tissue + 'static) -> Self {
-        let root = |near: Vec3| RootPlacement::Exact(vec![tissue.closest_point(near).position]);
-        let (arterial, venous) = (root(Vec3::new(-0.5, 0.0, 0.0)), root(Vec3::new(-0.495, 0.05, 0.0)));
+        let arterial = RootPlacement::Nearest(vec![Vec3::new(-0.5, 0.0, 0.0)]);
+        let venous = RootPlacement::Nearest(vec![Vec3::new(-0.495, 0.05, 0.0)]);
         Self { name, tissue: Arc::new(tissue), roots: Roots { arterial, venous, given: [None, None] } }
     }
 }
