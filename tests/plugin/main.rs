@@ -85,10 +85,7 @@ fn send(app: &mut App, organ: Entity, action: GrowthAction) {
 }
 
 /// Collects messages over frames.
-fn drain<M: Message>(world: &World, cursor: &mut MessageCursor<M>) -> Vec<M>
-where
-    M: Clone,
-{
+fn drain<M: Message + Clone>(world: &World, cursor: &mut MessageCursor<M>) -> Vec<M> {
     cursor.read(world.resource::<Messages<M>>()).cloned().collect()
 }
 
