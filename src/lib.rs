@@ -1,4 +1,53 @@
-//! Procedural blood vessels for Bevy.
+//! Procedural blood vessels for Bevy: arteries and veins that grow over an organ, or through it, while you watch.
+//!
+//! Add [`VesselPlugin`] to an app, and a [`Vasculature`](plugin::Vasculature) to any entity with a mesh:
+//!
+//! ```
+//! # #[cfg(feature = "plugin")] {
+//! use bevy::prelude::*;
+//! use bevy_vessels::prelude::*;
+//!
+//! fn spawn_organ(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>) {
+//!     let organ = meshes.add(Sphere::new(0.1).mesh().ico(20).expect("fewer than 80 subdivisions"));
+//!     commands.spawn((Mesh3d(organ), Vasculature::new(PresetName::Colon).with_seed(7)));
+//! }
+//! # }
+//! ```
+//!
+//! # From organ to picture
+//!
+//! Data flows one way: organ mesh → [`tissue`](synthesis::tissue) → attraction points → a growth step
+//! ([`colonization`](synthesis::colonization)) → [`VesselTree`](synthesis::tree::VesselTree) → what is drawn
+//! ([`instances`](synthesis::instances)) or written ([`io`](synthesis::io)).
+//!
+//! - [`synthesis`] makes vessels and knows no engine. Use it alone, without default features, for batches of organs.
+//! - [`plugin`] brings it into a world: components, a time budget for each frame, messages.
+//! - [`render`] draws the segments by instancing while they grow.
+//!
+//! # Units
+//!
+//! All lengths are in the local space of the organ's mesh, whatever its unit. Presets fit themselves to the organ's
+//! size. Angles in settings are in degrees.
+//!
+//! # Features
+//!
+//! | feature | default | what it adds |
+//! |---|---|---|
+//! | `plugin` | yes | the ECS glue, and `serialize` |
+//! | `render` | yes | instanced drawing |
+//! | `parallel` | yes | large steps on all threads, with the same result on any number |
+//! | `serialize` | with `plugin` | settings and presets as RON files |
+//! | `mesh_files` | no | organ meshes from GLB, glTF and OBJ files without Bevy |
+//!
+//! # Questions that come up
+//!
+//! **Is an organ the same at another frame rate, thread count or platform?** Yes. A step depends on settings and seed
+//! alone; the time budget only decides how many steps a frame takes.
+//!
+//! **My organ is in millimetres.** Nothing to do: see Units.
+//!
+//! **Why does nothing grow?** Look at the entity's [`GrowthProgress`](plugin::GrowthProgress) and the log: a mesh that
+//! cannot be used, or settings outside their limits, are named there with what to change.
 
 pub mod synthesis;
 
@@ -6,3 +55,39 @@ pub mod synthesis;
 pub mod plugin;
 #[cfg(feature = "render")]
 pub mod render;
+
+/// What most apps with vessels name: `use bevy_vessels::prelude::*`.
+#[cfg(feature = "plugin")]
+pub mod prelude {
+    pub use crate::VesselPlugin;
+    pub use crate::plugin::{
+        EntityCommandsExt, GrowthAction, GrowthBudget, GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished,
+        GrowthPhase, GrowthProgress, OrganVessels, SegmentColoring, Vasculature, VesselAppearance, VesselSystem,
+        Vessels,
+    };
+    pub use crate::synthesis::colonization::ColonizationSettings;
+    pub use crate::synthesis::preset::PresetName;
+    pub use crate::synthesis::roots::RootPlacement;
+    pub use crate::synthesis::tissue::{TissueMode, TissueSettings};
+    pub use crate::synthesis::tree::System;
+}
+
+#[cfg(feature = "plugin")]
+use bevy::app::{App, Plugin};
+
+/// Everything that an app with vessels needs: growth, and drawing where the app draws.
+///
+/// Add it after `DefaultPlugins`. In an app without a renderer vessels grow all the same.
+#[cfg(feature = "plugin")]
+#[derive(Clone, Debug, Default)]
+pub struct VesselPlugin {
+    /// How vessels grow in this app: schedule and budget.
+    pub growth: plugin::GrowthPlugin,
+}
+
+#[cfg(feature = "plugin")]
+impl Plugin for VesselPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins(self.growth.clone());
+    }
+}

@@ -1,5 +1,53 @@
-//! Everything that makes vessels, with no engine below it.
+//! Everything that makes vessels, with no engine below it: no world, clock, GPU or handle.
+//!
+//! # The pipeline
+//!
+//! 1. An organ's [`mesh`] becomes a [`tissue`]: its surface, its volume, or both in turn, with guides and a density. Or
+//!    the tissue is a plain shape, or a mask.
+//! 2. [`roots`] say where vessels enter it.
+//! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`].
+//! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
+//!
+//! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`rng`] hands out
+//! random streams, [`point_grid`] finds points by distance.
+//!
+//! # Words
+//!
+//! - **Node**: a point of a centre line. **Segment**: the piece from a node's parent to it. **Branch**: a run of
+//!   segments between splits. **Terminal**: a segment whose node has no child. **Root**: a node without a parent.
+//! - **Attraction point**: a spot that pulls vessels. **Drain**: one that lacks oxygen, and pulls arteries; once
+//!   supplied it pulls veins as a carbon-dioxide source.
+//! - **Birth**, **influence** and **kill distance**: how near to others a drain may be born, how far it is heard, and
+//!   how near a node must come to supply it. **Step length**: that of a new segment.
+//! - **Bifurcation exponent** κ: that of Murray's law, r_p^κ = r_l^κ + r_r^κ.
+//!
+//! # Example
+//!
+//! ```
+//! use bevy_vessels::synthesis::{
+//!     colonization::{ColonizationSettings, Growth},
+//!     io::{SwcOptions, save_swc},
+//!     roots::Roots,
+//!     tissue::{Disc, Tissue},
+//!     tree::System,
+//! };
+//! use std::sync::Arc;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let tissue = Arc::new(Disc::flat(50.0)?);
+//! let settings = ColonizationSettings::default().fit(tissue.extent());
+//! let mut growth = Growth::new(tissue, settings, &Roots::default(), 7)?;
+//! growth.run();
+//! let arteries = growth.vessels(System::Arterial);
+//! println!("{} nodes, {} tips", arteries.len(), arteries.tips().len());
+//! # let path = std::env::temp_dir().join("bevy_vessels_doctest.swc");
+//! save_swc(&path, &arteries, &SwcOptions::default())?;
+//! # std::fs::remove_file(path)?;
+//! # Ok(())
+//! # }
+//! ```
 
+mod attraction;
 pub mod colonization;
 pub mod instances;
 pub mod io;

@@ -1,1 +1,260 @@
-//! To be written.
+//! Named settings with their source: the paper's, its reference cases, its variations, and organs.
+//!
+//! A preset is a RON file; the built-in ones lie in `assets/presets` and are compiled in. Lengths are made for a tissue
+//! whose equivalent diameter is 1 and are fitted to the organ (see [`Preset::settings_for`]). What a file leaves out has
+//! its default.
+
+use crate::synthesis::colonization::{ColonizationSettings, SettingsError};
+use crate::synthesis::roots::{RootPlacement, Roots};
+use crate::synthesis::tissue::{Extent, TissueSettings};
+use std::fmt;
+use std::str::FromStr;
+
+/// Everything that tells one kind of vasculature from another, but for the organ and the seed.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
+pub struct Preset {
+    /// Where the numbers come from.
+    pub source: String,
+    /// Whether lengths are those of a tissue of equivalent diameter 1, to be fitted to the organ. Otherwise they are
+    /// tissue lengths as they stand.
+    ///
+    /// Default: true.
+    pub fit: bool,
+    /// Where on an organ mesh vessels grow: over its surface, through its volume, or in stages.
+    pub tissue: TissueSettings,
+    /// Where arteries begin.
+    ///
+    /// Default: one root, chosen by the seed.
+    pub arterial_roots: RootPlacement,
+    /// Where veins begin.
+    ///
+    /// Default: beside the arteries.
+    pub venous_roots: RootPlacement,
+    /// Settings of the growth.
+    pub settings: ColonizationSettings,
+}
+
+impl Default for Preset {
+    fn default() -> Self {
+        Self {
+            source: String::new(),
+            fit: true,
+            tissue: TissueSettings::default(),
+            arterial_roots: RootPlacement::Spread(1),
+            venous_roots: RootPlacement::Beside,
+            settings: ColonizationSettings::default(),
+        }
+    }
+}
+
+impl Preset {
+    /// The settings in the lengths of a tissue of this extent.
+    pub fn settings_for(&self, extent: Extent) -> ColonizationSettings {
+        if self.fit { self.settings.clone().fit(extent) } else { self.settings.clone() }
+    }
+
+    /// How both systems begin.
+    pub fn roots(&self) -> Roots {
+        Roots { arterial: self.arterial_roots.clone(), venous: self.venous_roots.clone(), given: [None, None] }
+    }
+
+    /// Reads a preset of the user's own.
+    ///
+    /// # Errors
+    /// Text that is not such a file, with line and column, or a setting outside its limits.
+    #[cfg(feature = "serialize")]
+    pub fn from_ron(text: &str) -> Result<Self, PresetError> {
+        let preset: Self = ron_options().from_str(text).map_err(Box::new)?;
+        preset.settings.validate()?;
+        Ok(preset)
+    }
+
+    /// Writes the preset as a file that [`from_ron`](Self::from_ron) reads.
+    ///
+    /// # Errors
+    /// Only if a number cannot be written, which does not happen for settings that validate.
+    #[cfg(feature = "serialize")]
+    pub fn to_ron(&self) -> Result<String, PresetError> {
+        let pretty = ron::ser::PrettyConfig::default();
+        ron_options().to_string_pretty(self, pretty).map_err(|error| PresetError::Write(error.to_string()))
+    }
+}
+
+/// Optional values are written without `Some`.
+#[cfg(feature = "serialize")]
+fn ron_options() -> ron::Options {
+    ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
+}
+
+/// Why a preset could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum PresetError {
+    /// No built-in preset has this name.
+    #[error("there is no preset {0:?}; there are {names}", names = PresetName::ALL.map(PresetName::name).join(", "))]
+    UnknownName(String),
+    /// A setting outside its limits.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// Text that is not a preset.
+    #[cfg(feature = "serialize")]
+    #[error("not a preset: {0}")]
+    Syntax(#[from] Box<ron::error::SpannedError>),
+    /// A preset that cannot be written.
+    #[error("the preset cannot be written: {0}")]
+    Write(String),
+}
+
+/// The built-in presets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub enum PresetName {
+    /// The paper's defaults, with venous settings that never stall.
+    #[default]
+    Paper,
+    /// The paper's own program on its disc, defects included, as the reference figures were measured.
+    ReferenceDisc,
+    /// The same program in a ball.
+    ReferenceBall,
+    /// The paper's Fig. 5 with a larger exponent: wider angles, less difference in radius.
+    WideAngles,
+    /// The paper's Fig. 5 with a larger direction weight: straighter vessels.
+    Straight,
+    /// The paper's Fig. 5 with a smaller bifurcation threshold: more symmetric bifurcations.
+    Symmetric,
+    /// The paper's Fig. 5 with a larger bifurcation threshold: more lateral branches.
+    Lateral,
+    /// The wall of the large intestine.
+    Colon,
+    /// The liver, through its volume.
+    Liver,
+    /// The kidney, through its volume.
+    Kidney,
+    /// The white of the eye.
+    Conjunctiva,
+    /// The back of the eye.
+    Retina,
+}
+
+impl PresetName {
+    /// Number of built-in presets.
+    pub const COUNT: usize = 12;
+    /// All built-in presets.
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Paper,
+        Self::ReferenceDisc,
+        Self::ReferenceBall,
+        Self::WideAngles,
+        Self::Straight,
+        Self::Symmetric,
+        Self::Lateral,
+        Self::Colon,
+        Self::Liver,
+        Self::Kidney,
+        Self::Conjunctiva,
+        Self::Retina,
+    ];
+
+    /// The name in files and on command lines, such as `reference-disc`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::ReferenceDisc => "reference-disc",
+            Self::ReferenceBall => "reference-ball",
+            Self::WideAngles => "wide-angles",
+            Self::Straight => "straight",
+            Self::Symmetric => "symmetric",
+            Self::Lateral => "lateral",
+            Self::Colon => "colon",
+            Self::Liver => "liver",
+            Self::Kidney => "kidney",
+            Self::Conjunctiva => "conjunctiva",
+            Self::Retina => "retina",
+        }
+    }
+
+    /// The file's text.
+    #[cfg(feature = "serialize")]
+    pub fn ron(self) -> &'static str {
+        macro_rules! file {
+            ($name:literal) => {
+                include_str!(concat!("../../assets/presets/", $name, ".ron"))
+            };
+        }
+        match self {
+            Self::Paper => file!("paper"),
+            Self::ReferenceDisc => file!("reference-disc"),
+            Self::ReferenceBall => file!("reference-ball"),
+            Self::WideAngles => file!("wide-angles"),
+            Self::Straight => file!("straight"),
+            Self::Symmetric => file!("symmetric"),
+            Self::Lateral => file!("lateral"),
+            Self::Colon => file!("colon"),
+            Self::Liver => file!("liver"),
+            Self::Kidney => file!("kidney"),
+            Self::Conjunctiva => file!("conjunctiva"),
+            Self::Retina => file!("retina"),
+        }
+    }
+
+    /// The preset.
+    #[cfg(feature = "serialize")]
+    #[expect(clippy::expect_used, reason = "the text is compiled in, and a test loads every one")]
+    pub fn load(self) -> Preset {
+        Preset::from_ron(self.ron()).expect("built-in presets are valid")
+    }
+}
+
+impl fmt::Display for PresetName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for PresetName {
+    type Err = PresetError;
+
+    fn from_str(name: &str) -> Result<Self, PresetError> {
+        Self::ALL
+            .into_iter()
+            .find(|preset| preset.name() == name)
+            .ok_or_else(|| PresetError::UnknownName(name.to_owned()))
+    }
+}
+
+#[cfg(all(test, feature = "serialize"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_built_in_preset_loads_names_its_source_and_survives_a_round_trip() {
+        for name in PresetName::ALL {
+            let preset = Preset::from_ron(name.ron()).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert!(preset.source.len() > 20, "{name} names no source");
+            assert_eq!(name.name().parse::<PresetName>().ok(), Some(name));
+            let text = preset.to_ron().expect("a valid preset can be written");
+            assert_eq!(Preset::from_ron(&text).ok(), Some(preset));
+        }
+    }
+
+    #[test]
+    fn the_papers_preset_is_the_default() {
+        let paper = PresetName::Paper.load();
+        assert_eq!(paper.settings, ColonizationSettings::default());
+        assert_eq!(Preset { source: paper.source.clone(), ..Preset::default() }, paper);
+        assert!(paper.settings.validate().is_ok_and(|warnings| warnings.is_empty()));
+    }
+
+    #[test]
+    fn bad_files_are_refused_by_name() {
+        assert!("colonn".parse::<PresetName>().is_err_and(|error| error.to_string().contains("colon,")));
+        let unknown = Preset::from_ron("(settings: (stepz: 3))").map_err(|error| error.to_string());
+        assert!(unknown.is_err_and(|text| text.contains("stepz")));
+        let outside = Preset::from_ron("(settings: (arterial: (direction_weight: 7.0)))").map_err(|e| e.to_string());
+        assert!(outside.is_err_and(|text| text.contains("direction_weight is 7")));
+        for garbage in ["", "(", "\u{0}\u{1}", "[1, 2]", "(settings: (steps: -1))"] {
+            assert!(Preset::from_ron(garbage).is_err(), "{garbage:?}");
+        }
+    }
+}

@@ -1,15 +1,33 @@
-//! To be written.
+//! Vessel growth by space colonization: drains pull, nodes follow, Murray's law sets radii and angles.
+//!
+//! In: a [`Tissue`], [`ColonizationSettings`], [`Roots`] and a seed. Out: two [`VesselTree`]s, arterial and venous, a
+//! little larger after each [`Growth::step`]. Source: Rauch & Harders, "Interactive Synthesis of 3D Geometries of Blood
+//! Vessels", Eurographics 2021 (short papers), section 3.
+//!
+//! A step samples the tissue for new oxygen drains, grows the arteries towards them, hands the drains that are now
+//! supplied to the venous system as carbon-dioxide sources, grows the veins towards those, and lets the tissue grow.
+//!
+//! What a step does depends on the settings and the seed alone: not on time, frames or the number of threads.
+
+mod direction;
+mod forest;
+mod lengths;
+mod parallel;
+mod perception;
 pub mod settings;
+mod system_growth;
+#[cfg(test)]
+mod tests;
 
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
-use crate::synthesis::{
-    roots::Roots,
-    tissue::Tissue,
-    tree::{System, VesselTree},
-};
+use crate::synthesis::rng::{Stream, VesselRng};
+use crate::synthesis::roots::{RootError, Roots};
+use crate::synthesis::tissue::{Extent, Tissue, TissuePoint};
+use crate::synthesis::tree::{NodeId, System, VesselTree};
 use bevy_math::Vec3;
 use std::sync::Arc;
+use system_growth::{Ground, SystemGrowth};
 
 /// What one step did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,6 +40,13 @@ pub struct StepReport {
     pub born: u32,
     /// What the arteries did, and the veins.
     pub systems: [SystemReport; 2],
+}
+
+impl StepReport {
+    /// What the step did to one system.
+    pub fn system(&self, system: System) -> SystemReport {
+        self.systems[system.index()]
+    }
 }
 
 /// What one step did to one system.
@@ -43,74 +68,218 @@ pub enum GrowthError {
     /// A setting outside its limits.
     #[error(transparent)]
     Settings(#[from] SettingsError),
+    /// Roots that do not fit the tissue.
+    #[error(transparent)]
+    Roots(#[from] RootError),
+    /// The arteries have no root to grow from, and the veins follow the arteries.
+    #[error("the arterial system has no root; place at least one, or give it a tree to grow from")]
+    NoArterialRoot,
 }
 
 /// A growth under way.
+///
+/// Make one with [`new`](Self::new), call [`step`](Self::step) until [`is_finished`](Self::is_finished), or
+/// [`run`](Self::run), and read [`tree`](Self::tree) or [`vessels`](Self::vessels) at any time between.
 #[derive(Debug)]
 pub struct Growth {
+    tissue: Arc<dyn Tissue>,
     settings: ColonizationSettings,
-    trees: [VesselTree; 2],
+    systems: [SystemGrowth; 2],
+    rng: VesselRng,
+    step: u32,
+    candidates: Vec<Vec3>,
+    supplied: Vec<bool>,
 }
 
 impl Growth {
-    /// Prepares a growth. Settings are in the tissue's lengths: see [`ColonizationSettings::fit`].
+    /// Prepares a growth. Lengths in the settings are the tissue's: see [`ColonizationSettings::fit`].
+    ///
+    /// # Errors
+    /// A setting outside its limits, roots that are not finite or lie too far from the tissue, or no arterial root.
     pub fn new(
-        _tissue: Arc<dyn Tissue>,
+        tissue: Arc<dyn Tissue>,
         settings: ColonizationSettings,
-        _roots: &Roots,
-        _seed: u64,
+        roots: &Roots,
+        seed: u64,
     ) -> Result<Self, GrowthError> {
         settings.validate()?;
-        Ok(Self { settings, trees: Default::default() })
+        let bounds = tissue.bounds();
+        let systems = System::ALL.map(|system| SystemGrowth::new(settings.system(system), &bounds));
+        let rng = Stream::Attraction.rng(seed);
+        let mut growth = Self { tissue, settings, systems, rng, step: 0, candidates: Vec::new(), supplied: Vec::new() };
+        growth.plant(roots, seed)?;
+        Ok(growth)
     }
-    /// Starts again, keeping buffers.
-    pub fn restart(&mut self, _settings: ColonizationSettings, _roots: &Roots, _seed: u64) -> Result<(), GrowthError> {
+
+    /// Starts again on the same tissue with other settings, roots or seed, keeping all memory.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new); the growth is then as it was.
+    pub fn restart(&mut self, settings: ColonizationSettings, roots: &Roots, seed: u64) -> Result<(), GrowthError> {
+        settings.validate()?;
+        let placed = Self::placed(self.tissue.as_ref(), &settings, roots, seed)?;
+        let bounds = self.tissue.bounds();
+        for system in System::ALL {
+            self.systems[system.index()].restart(settings.system(system), &bounds);
+        }
+        self.settings = settings;
+        self.rng = Stream::Attraction.rng(seed);
+        self.step = 0;
+        self.plant_at(&placed, roots);
         Ok(())
     }
-    /// One step.
-    pub fn step(&mut self) -> StepReport {
-        StepReport::default()
+
+    fn plant(&mut self, roots: &Roots, seed: u64) -> Result<(), GrowthError> {
+        let placed = Self::placed(self.tissue.as_ref(), &self.settings, roots, seed)?;
+        self.plant_at(&placed, roots);
+        Ok(())
     }
-    /// All remaining steps.
+
+    fn placed(
+        tissue: &dyn Tissue,
+        settings: &ColonizationSettings,
+        roots: &Roots,
+        seed: u64,
+    ) -> Result<[Vec<TissuePoint>; 2], GrowthError> {
+        let placed = roots.resolve(tissue, settings, seed)?;
+        let arteries = System::Arterial.index();
+        let given = roots.given[arteries].as_ref().is_some_and(|tree| !tree.is_empty());
+        if placed[arteries].is_empty() && !given { Err(GrowthError::NoArterialRoot) } else { Ok(placed) }
+    }
+
+    fn plant_at(&mut self, placed: &[Vec<TissuePoint>; 2], roots: &Roots) {
+        for (index, system) in self.systems.iter_mut().enumerate() {
+            let ground = ground(self.tissue.as_ref(), &self.settings, 1);
+            system.plant(&placed[index], roots.given[index].as_ref(), ground);
+        }
+    }
+
+    /// Grows all vessels by one step. Does nothing once growth is finished.
+    pub fn step(&mut self) -> StepReport {
+        if self.is_finished() {
+            return StepReport { step: self.step, ..StepReport::default() };
+        }
+        self.step += 1;
+        let step = self.step;
+        let tissue = Arc::clone(&self.tissue);
+        let ground = ground(tissue.as_ref(), &self.settings, step);
+        let born = self.sample(ground.tissue);
+        let [arteries, veins] = &mut self.systems;
+        let arterial = arteries.grow(ground, step);
+        let venous = if veins.forest.tree.is_empty() {
+            SystemReport::default()
+        } else {
+            veins.receive(arteries.supplied());
+            veins.grow(ground, step)
+        };
+        arteries.advance_tissue(step);
+        veins.advance_tissue(step);
+        StepReport { step, sampled: self.settings.samples, born, systems: [arterial, venous] }
+    }
+
+    /// Draws candidates and lets those in unsupplied tissue become drains. Their number comes back.
+    fn sample(&mut self, tissue: &dyn Tissue) -> u32 {
+        self.candidates.clear();
+        let draws = (0..self.settings.samples).filter_map(|_| tissue.sample(&mut self.rng));
+        self.candidates.extend(draws.filter(|candidate| candidate.is_finite()));
+        let arteries = &mut self.systems[System::Arterial.index()];
+        parallel::map_into(&self.candidates, &mut self.supplied, false, |&candidate| arteries.supplies(candidate));
+        let mut born = 0;
+        for (&candidate, &supplied) in self.candidates.iter().zip(&self.supplied) {
+            born += u32::from(!supplied && arteries.offer_drain(candidate));
+        }
+        born
+    }
+
+    /// Takes all steps that are left.
     pub fn run(&mut self) {
         while !self.is_finished() {
             self.step();
         }
     }
-    /// Whether all steps are done.
+
+    /// Whether all steps have been taken.
     pub fn is_finished(&self) -> bool {
-        true
+        self.step >= self.settings.steps
     }
-    /// Steps done so far.
+
+    /// Number of steps taken.
     pub fn steps_done(&self) -> u32 {
-        0
+        self.step
     }
+
     /// The settings in force.
     pub fn settings(&self) -> &ColonizationSettings {
         &self.settings
     }
-    /// Centre lines, on the tissue.
+
+    /// The tissue that is grown into.
+    pub fn tissue(&self) -> &Arc<dyn Tissue> {
+        &self.tissue
+    }
+
+    /// Centre lines of a system, on the tissue.
     pub fn tree(&self, system: System) -> &VesselTree {
-        &self.trees[system.index()]
+        &self.forest(system).tree
     }
-    /// Surface normal of the tissue at every node of `tree(system)`, zero in a volume.
-    pub fn normals(&self, _system: System) -> &[Vec3] {
-        &[]
+
+    /// Normal of the tissue's surface at every node, zero in a volume.
+    pub fn normals(&self, system: System) -> &[Vec3] {
+        &self.forest(system).normals
     }
-    /// The step in which each node was born, 0 for roots.
-    pub fn birth_steps(&self, _system: System) -> &[u32] {
-        &[]
+
+    /// The step in which each node was born, 0 for those that growth began with.
+    pub fn birth_steps(&self, system: System) -> &[u32] {
+        &self.forest(system).birth_steps
     }
-    /// Nodes, new ones included, whose radius changed in the last step.
-    pub fn changed_radii(&self, _system: System) -> &[u32] {
-        &[]
+
+    /// Nodes whose radius changed in the last step, new ones included, from the tips to the roots.
+    pub fn changed_radii(&self, system: System) -> &[u32] {
+        self.forest(system).changed()
     }
-    /// Living drains of a system.
-    pub fn drains(&self, _system: System) -> usize {
-        0
+
+    /// Drains of a system that wait to be supplied.
+    pub fn drains(&self, system: System) -> impl Iterator<Item = Vec3> + '_ {
+        self.systems[system.index()].drains.positions()
     }
-    /// The finished product: centre lines lifted off a surface by their radius when `stand_off` says so.
+
+    /// Number of drains of a system that wait to be supplied.
+    pub fn drains_left(&self, system: System) -> usize {
+        self.systems[system.index()].drains.len()
+    }
+
+    /// λ_t of a system: what its lengths are multiplied by at the present size of the tissue.
+    pub fn length_scale(&self, system: System) -> f32 {
+        self.systems[system.index()].tissue_size().recip()
+    }
+
+    /// Where a node is drawn: lifted off the surface by its radius where the settings say so.
+    ///
+    /// # Panics
+    /// When the node is not of this system's tree.
+    pub fn lifted_position(&self, system: System, node: NodeId) -> Vec3 {
+        let forest = self.forest(system);
+        let (position, index) = (forest.tree.positions()[node.index()], node.index());
+        if self.settings.stand_off { position + forest.normals[index] * forest.tree.radii()[index] } else { position }
+    }
+
+    /// The vessels as they are drawn and written: [`tree`](Self::tree) with every node at its
+    /// [`lifted_position`](Self::lifted_position).
     pub fn vessels(&self, system: System) -> VesselTree {
-        self.trees[system.index()].clone()
+        let mut vessels = self.tree(system).clone();
+        for (node, position) in vessels.positions_mut().iter_mut().enumerate() {
+            *position = self.lifted_position(system, NodeId(node as u32));
+        }
+        vessels
     }
+
+    fn forest(&self, system: System) -> &forest::Forest {
+        &self.systems[system.index()].forest
+    }
+}
+
+fn ground<'a>(tissue: &'a dyn Tissue, settings: &ColonizationSettings, step: u32) -> Ground<'a> {
+    let tissue = tissue.at_step(step);
+    let surface = matches!(tissue.extent(), Extent::Area(_));
+    Ground { tissue, confine: settings.confine, normals: settings.stand_off && surface }
 }

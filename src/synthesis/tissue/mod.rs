@@ -3,10 +3,37 @@
 //! A tissue answers four questions: how large it is, whether a point belongs to it, which of its points is closest to a
 //! given one, and where the next attraction point is drawn. Points, normals and lengths are in the local space of the
 //! organ's mesh ("tissue lengths").
+//!
+//! | kind | what it is |
+//! |---|---|
+//! | [`shape`] | disc, rectangle, ball, box and ellipsoid, exactly |
+//! | [`surface`] | the triangles of an organ's mesh |
+//! | [`volume`] | what an organ's mesh encloses, voxelised |
+//! | [`mask`] | the set pixels or voxels of an image |
+//! | [`path`] | guides: polylines with a deviation |
+//! | [`density`] | any of these, with regions that ask for more or fewer vessels |
+//! | [`staged`] | one after the other |
+//!
+//! [`settings`] describes the tissue of an organ as data, and builds it from the organ's mesh.
 
+pub mod bvh;
+mod error;
 pub mod growth;
+mod orientation;
+pub mod settings;
+pub mod shape;
+pub mod surface;
+pub mod triangle;
+pub mod volume;
+mod voxels;
 
+pub use error::TissueError;
 pub use growth::TissueGrowth;
+pub use settings::{TissueMode, TissueSettings};
+pub use shape::{Ball, Cuboid, Disc, Ellipsoid, Rectangle};
+pub use surface::MeshSurface;
+pub use triangle::{SurfacePoint, TriangleIndex};
+pub use volume::MeshVolume;
 
 use crate::synthesis::rng::VesselRng;
 use bevy_math::{Vec3, bounding::Aabb3d};
@@ -56,7 +83,8 @@ pub trait Tissue: Debug + Send + Sync {
 
     /// Whether a point belongs to the tissue.
     ///
-    /// A surface has no inside: for it this is true within a small tolerance of the surface.
+    /// A surface or a curve has no inside: for it this is true within a small tolerance. Every point that
+    /// [`sample`](Self::sample) or [`closest_point`](Self::closest_point) gives is contained.
     fn contains(&self, point: Vec3) -> bool;
 
     /// The point of the tissue nearest to `point`: `point` itself where the tissue contains it.
@@ -68,6 +96,23 @@ pub trait Tissue: Debug + Send + Sync {
     /// tissue of no size. The caller counts it as a sample all the same.
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3>;
 
-    /// The tissue in force at a growth step, for tissues that change in stages.
-    fn at_step(&self, _step: u32) -> &dyn Tissue;
+    /// Where vessels enter the tissue of themselves, if there is such a place: the beginning of a guide.
+    fn entrance(&self) -> Option<Vec3> {
+        None
+    }
+
+    /// The tissue that takes the place of this one at a growth step, counted from 1; `None` where this one stays.
+    ///
+    /// Only tissues that change in stages have one. To ask for the tissue in force, call
+    /// [`at_step`](trait@Tissue#method.at_step), which every `dyn Tissue` has.
+    fn stage(&self, _step: u32) -> Option<&dyn Tissue> {
+        None
+    }
+}
+
+impl dyn Tissue + '_ {
+    /// The tissue in force at a growth step, counted from 1: itself, unless it changes in [stages](Tissue::stage).
+    pub fn at_step(&self, step: u32) -> &dyn Tissue {
+        self.stage(step).unwrap_or(self)
+    }
 }

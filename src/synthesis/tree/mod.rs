@@ -5,10 +5,13 @@
 
 use bevy_math::Vec3;
 
+mod hash;
 pub mod statistics;
 pub mod sweep;
 pub mod validate;
 
+pub use hash::hash_trees;
+pub use statistics::TreeStatistics;
 pub use validate::TreeError;
 
 /// A node of a [`VesselTree`], and the segment that ends in it.

@@ -1,0 +1,62 @@
+//! The settings of one system as a step uses them: lengths multiplied by λ_t, angles in radians and cosines.
+
+use super::settings::{AngleSpread, SystemSettings};
+use crate::synthesis::murray;
+use bevy_math::ops;
+use std::f32::consts::PI;
+
+/// One system's settings at the present size of the tissue.
+#[derive(Clone, Debug)]
+pub(crate) struct Lengths {
+    pub drain_birth: f32,
+    pub node_birth: f32,
+    pub influence: f32,
+    pub kill: f32,
+    pub step: f32,
+    pub terminal_radius: f32,
+    pub direction_weight: f32,
+    /// γ/2 in radians.
+    pub half_perception: f32,
+    /// cos γ/2, or below −1 where everything is seen.
+    pub cos_half_perception: f32,
+    pub bifurcation_threshold: f32,
+    pub angle_spread: AngleSpread,
+    /// Half the angle between the daughters of a symmetric bifurcation, in radians.
+    pub half_bifurcation: f32,
+    pub lateral_sprouts: bool,
+    pub root_children: u32,
+}
+
+impl Lengths {
+    /// At tissue size σ_t, the size at the start being 1: λ_t = 1/σ_t.
+    pub fn at_size(settings: &SystemSettings, size: f32) -> Self {
+        let scale = size.recip();
+        let half_perception = (0.5 * settings.perception_angle).to_radians();
+        Self {
+            drain_birth: settings.drain_birth_distance * scale,
+            node_birth: settings.node_birth_distance * scale,
+            influence: settings.influence_distance * scale,
+            kill: settings.kill_distance * scale,
+            step: settings.step_length * scale,
+            terminal_radius: settings.terminal_radius * if settings.scale_terminal_radius { scale } else { 1.0 },
+            direction_weight: settings.direction_weight,
+            half_perception,
+            cos_half_perception: if half_perception >= PI { -2.0 } else { ops::cos(half_perception) },
+            bifurcation_threshold: settings.bifurcation_threshold.to_radians(),
+            angle_spread: settings.angle_spread,
+            half_bifurcation: murray::symmetric_half_angle(settings.bifurcation_exponent),
+            lateral_sprouts: settings.lateral_sprouts,
+            root_children: settings.root_children,
+        }
+    }
+
+    /// Side of the cells of the index over nodes: what is asked for most, yet not many cells within the influence distance.
+    pub fn node_cell(&self) -> f32 {
+        self.node_birth.max(self.kill).max(0.25 * self.influence)
+    }
+
+    /// Side of the cells of the index over drains.
+    pub fn drain_cell(&self) -> f32 {
+        self.drain_birth.max(0.5 * self.influence)
+    }
+}

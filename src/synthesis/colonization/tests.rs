@@ -1,0 +1,212 @@
+//! Tests that look inside a growth: exact association, and cases where nothing may break.
+
+use super::*;
+use crate::synthesis::roots::RootPlacement;
+use crate::synthesis::tissue::TissueGrowth;
+use crate::synthesis::tissue::shape::{Ball, Disc};
+
+fn disc() -> Arc<dyn Tissue> {
+    Arc::new(Disc::flat(0.5).expect("a disc of radius 0.5"))
+}
+
+fn roots() -> Roots {
+    Roots {
+        arterial: RootPlacement::Exact(vec![Vec3::new(-0.5, 0.0, 0.0)]),
+        venous: RootPlacement::Exact(vec![Vec3::new(-0.495, 0.05, 0.0)]),
+        given: [None, None],
+    }
+}
+
+fn growth(settings: ColonizationSettings) -> Growth {
+    Growth::new(disc(), settings, &roots(), 3).expect("valid settings")
+}
+
+/// What must hold of both trees after every step.
+fn assert_sound(growth: &Growth) {
+    for system in System::ALL {
+        let tree = growth.tree(system);
+        tree.validate().expect("a well-formed tree");
+        let residual = tree.murray_residual(growth.settings().system(system).bifurcation_exponent);
+        assert!(residual <= 1e-5, "{} residual {residual}", system.name());
+        assert_eq!(growth.normals(system).len(), tree.len());
+        assert_eq!(growth.birth_steps(system).len(), tree.len());
+    }
+}
+
+#[test]
+fn association_equals_its_brute_force_twin_at_every_step() {
+    let ball: Arc<dyn Tissue> = Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball of radius 0.5"));
+    // Lengths that shrink, lengths that grow again, and open nodes of every kind.
+    let swinging = TissueGrowth::from_fn(30, |step| if step % 7 < 4 { 1.0 + 0.1 * step as f32 } else { 1.0 });
+    for (case, tissue) in [disc(), disc(), ball].into_iter().enumerate() {
+        let mut settings = ColonizationSettings { steps: 30, samples: 300, ..ColonizationSettings::default() };
+        if case == 2 {
+            settings = settings.scaled(2.0);
+        }
+        if case == 1 {
+            settings.arterial.tissue_growth = swinging.clone();
+            settings.arterial.lateral_sprouts = false;
+            settings.venous.root_children = 5;
+        }
+        let mut growth = Growth::new(tissue, settings, &roots(), 5).expect("valid settings");
+        while !growth.is_finished() {
+            growth.step();
+            for system in &mut growth.systems {
+                system.assert_association_exact();
+            }
+        }
+        assert!(growth.tree(System::Arterial).len() > 20, "case {case}: {}", growth.tree(System::Arterial).len());
+    }
+}
+
+#[test]
+fn a_growth_without_samples_or_drains_rests() {
+    let mut growth = growth(ColonizationSettings { samples: 0, ..ColonizationSettings::default() });
+    growth.run();
+    assert_eq!(growth.tree(System::Arterial).len(), 1);
+    assert_eq!(growth.steps_done(), 100);
+    assert_eq!(growth.step().systems, [SystemReport::default(); 2]);
+}
+
+/// A growth whose only drains are these.
+fn pulled_by(drains: &[Vec3], change: impl Fn(&mut ColonizationSettings)) -> Growth {
+    let mut settings =
+        ColonizationSettings { samples: 0, steps: 40, confine: false, ..ColonizationSettings::default() };
+    change(&mut settings);
+    let mut growth = growth(settings);
+    growth.systems[0].receive(drains);
+    while !growth.is_finished() {
+        growth.step();
+        assert_sound(&growth);
+    }
+    growth
+}
+
+#[test]
+fn drains_in_awkward_places_do_no_harm() {
+    let root = Vec3::new(-0.5, 0.0, 0.0);
+    let beside = |x: f32, y: f32| root + Vec3::new(x, y, 0.0);
+    // On the root; opposite each other; in a row with the root; many at one point.
+    for drains in [
+        vec![root],
+        vec![beside(0.03, 0.0), beside(-0.03, 0.0)],
+        vec![beside(0.02, 0.0), beside(0.04, 0.0), beside(0.06, 0.0)],
+        vec![beside(0.05, 0.01); 50],
+    ] {
+        for weight in [0.0, 0.5, 1.0] {
+            for angle in [0.0, 90.0, 360.0] {
+                pulled_by(&drains, |settings| {
+                    settings.arterial.direction_weight = weight;
+                    settings.arterial.perception_angle = angle;
+                });
+            }
+        }
+    }
+}
+
+#[test]
+fn opposite_drains_leave_a_root_at_rest() {
+    let root = Vec3::new(-0.5, 0.0, 0.0);
+    let growth = pulled_by(&[root + Vec3::Y * 0.04, root - Vec3::Y * 0.04], |_| {});
+    assert_eq!(growth.tree(System::Arterial).len(), 1);
+}
+
+#[test]
+fn a_node_that_would_lie_on_another_is_not_made() {
+    // Two drains on either side make the tip bifurcate again and again around the same place.
+    let growth = pulled_by(&[Vec3::new(-0.45, 0.02, 0.0), Vec3::new(-0.45, -0.02, 0.0)], |settings| {
+        settings.arterial.kill_distance = 1e-4;
+        settings.arterial.perception_angle = 360.0;
+        settings.arterial.tissue_growth = TissueGrowth::None;
+    });
+    let positions = growth.tree(System::Arterial).positions();
+    for (i, a) in positions.iter().enumerate() {
+        assert!(positions[..i].iter().all(|b| a.distance(*b) > 1e-5));
+    }
+}
+
+#[test]
+fn leaf_only_development_never_sprouts_sideways() {
+    let mut settings = ColonizationSettings::default();
+    settings.arterial.lateral_sprouts = false;
+    let mut growth = growth(settings);
+    growth.run();
+    let tree = growth.tree(System::Arterial);
+    let births = growth.birth_steps(System::Arterial);
+    let children = tree.children();
+    for node in 0..tree.len() {
+        // A root is no inter-node: its vessels may leave it at any time.
+        if let [a, b] = *children.of(node)
+            && tree.parent(NodeId(node as u32)).is_some()
+        {
+            assert_eq!(births[a as usize], births[b as usize], "node {node} sprouted sideways");
+        }
+    }
+    assert!(tree.len() > 100);
+}
+
+#[test]
+fn growth_goes_on_from_a_given_tree() {
+    let mut first = growth(ColonizationSettings { steps: 30, ..ColonizationSettings::default() });
+    first.run();
+    let given = first.tree(System::Arterial).clone();
+    let mut roots = roots();
+    roots.arterial = RootPlacement::None;
+    roots.given = [Some(given.clone()), None];
+    let mut second = Growth::new(disc(), ColonizationSettings::default(), &roots, 9).expect("valid settings");
+    assert_eq!(second.tree(System::Arterial).positions(), given.positions());
+    for (radius, expected) in second.tree(System::Arterial).radii().iter().zip(given.radii()) {
+        assert!((radius / expected - 1.0).abs() < 1e-4, "{radius} against {expected}");
+    }
+    second.run();
+    assert_sound(&second);
+    let tree = second.tree(System::Arterial);
+    assert!(tree.len() > 2 * given.len());
+    assert_eq!(tree.parents()[..given.len()], *given.parents());
+}
+
+#[test]
+fn growth_needs_an_arterial_root_and_names_it() {
+    let none = Roots { arterial: RootPlacement::None, ..roots() };
+    let error = Growth::new(disc(), ColonizationSettings::default(), &none, 1).expect_err("no root");
+    assert!(error.to_string().contains("no root"));
+    let wrong = ColonizationSettings { steps: 0, ..ColonizationSettings::default() };
+    let error = Growth::new(disc(), wrong, &roots(), 1).expect_err("no steps");
+    assert!(error.to_string().contains("steps is 0"));
+}
+
+#[test]
+fn a_failed_restart_leaves_the_growth_as_it_was() {
+    let mut growth = growth(ColonizationSettings { steps: 20, ..ColonizationSettings::default() });
+    growth.run();
+    let before = growth.tree(System::Arterial).clone();
+    let none = Roots { arterial: RootPlacement::None, ..roots() };
+    assert!(growth.restart(ColonizationSettings::default(), &none, 1).is_err());
+    assert_eq!(growth.tree(System::Arterial), &before);
+}
+
+#[test]
+fn changed_radii_are_those_that_changed() {
+    let mut growth = growth(ColonizationSettings::default());
+    let mut before: [Vec<f32>; 2] = Default::default();
+    while !growth.is_finished() {
+        growth.step();
+        for system in System::ALL {
+            let radii = growth.tree(system).radii();
+            let old = &mut before[system.index()];
+            let mut changed: Vec<u32> = growth.changed_radii(system).to_vec();
+            changed.reverse();
+            let expected = (0..radii.len() as u32).filter(|&i| old.get(i as usize) != Some(&radii[i as usize]));
+            let expected: Vec<u32> = if growth.steps_done() == 1 {
+                expected.filter(|&i| growth.birth_steps(system)[i as usize] > 0 || changed.contains(&i)).collect()
+            } else {
+                expected.collect()
+            };
+            // A radius may be written anew with the same value; none that changed may be missing.
+            assert!(expected.iter().all(|node| changed.binary_search(node).is_ok()));
+            assert!(changed.len() <= expected.len() + radii.len() / 10);
+            old.clear();
+            old.extend_from_slice(radii);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Files that are there whole or not at all.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Why a file was not written. What was at its path before is still there, unchanged.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The path ends in no file name.
+    #[error("{} names no file; add a file name", path.display())]
+    NoFileName {
+        /// The path given.
+        path: PathBuf,
+    },
+    /// No file can be made in the folder: it is missing, or closed to this user.
+    #[error("cannot create a file beside {}: {source}", path.display())]
+    Create {
+        /// The path given.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The content was not written to its end: the disk is full, or its source failed.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The path given.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The finished file cannot take its name: a folder has it, or another program holds it.
+    #[error("cannot replace {}: {source}", path.display())]
+    Replace {
+        /// The path given.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// Writes a file so that at every moment its path holds either what was there before or the whole new content.
+///
+/// The content goes to a temporary file in the same folder, is flushed and synchronised with the disk, and takes the
+/// name of the file in one rename. If anything fails, or `write` panics, the temporary file is removed. A process that
+/// is killed can leave one behind, with a name that ends in `.tmp`; nothing reads it. A symbolic link at the path is
+/// replaced, not followed. A file that is replaced hands its permissions on.
+///
+/// # Errors
+/// What failed, with the path. The file at the path is then as it was.
+pub fn write_atomically(
+    path: impl AsRef<Path>,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), WriteError> {
+    let path = path.as_ref();
+    let name = path.file_name().ok_or_else(|| WriteError::NoFileName { path: path.to_owned() })?;
+    let (file, temporary) =
+        Temporary::create(path, name).map_err(|source| WriteError::Create { path: path.to_owned(), source })?;
+    fill(file, path, write).map_err(|source| WriteError::Write { path: path.to_owned(), source })?;
+    temporary.replace(path).map_err(|source| WriteError::Replace { path: path.to_owned(), source })
+}
+
+fn fill(file: File, path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut out = BufWriter::new(file);
+    write(&mut out)?;
+    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    if let Ok(before) = fs::symlink_metadata(path)
+        && before.is_file()
+    {
+        file.set_permissions(before.permissions())?;
+    }
+    file.sync_all()
+}
+
+/// A file that is removed unless it takes its final name.
+struct Temporary {
+    path: PathBuf,
+    is_done: bool,
+}
+
+impl Temporary {
+    /// How many names are tried before giving up on a folder full of leftovers.
+    const TRIES: u32 = 1000;
+
+    /// Makes a new, empty file in the folder of `target`, under a name that no other file, thread or process has.
+    fn create(target: &Path, name: &std::ffi::OsStr) -> io::Result<(File, Self)> {
+        static COUNTER: AtomicU32 = AtomicU32::new(0);
+        for _ in 0..Self::TRIES {
+            let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+            let mut hidden = OsString::from(".");
+            hidden.push(name);
+            hidden.push(format!(".{}-{number}.tmp", std::process::id()));
+            let path = target.with_file_name(hidden);
+            match OpenOptions::new().write(true).create_new(true).open(&path) {
+                Ok(file) => return Ok((file, Self { path, is_done: false })),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Err(io::Error::new(ErrorKind::AlreadyExists, "too many leftover .tmp files; remove them"))
+    }
+
+    fn replace(mut self, target: &Path) -> io::Result<()> {
+        fs::rename(&self.path, target)?;
+        self.is_done = true;
+        sync_folder(target);
+        Ok(())
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if !self.is_done {
+            // Nothing better can be done about a file that cannot be removed; the first error is the one to report.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Makes the new name survive a power cut, where folders can be synchronised. The content is safe either way.
+#[cfg(unix)]
+fn sync_folder(target: &Path) {
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
+}
+
+#[cfg(not(unix))]
+fn sync_folder(_target: &Path) {}

@@ -1,0 +1,262 @@
+//! Reading SWC. The format is described in `swc.rs`.
+
+use crate::synthesis::tree::{NO_PARENT, TreeError, VesselTree};
+use bevy_math::Vec3;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+/// How a file is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SwcReadOptions {
+    /// Radius given to nodes whose own is smaller, zero or negative, as traced vessels at times have it.
+    ///
+    /// Units: those of the file. Limits: finite and > 0; otherwise it has no effect.
+    /// Default: `None`, which makes such nodes an error.
+    pub least_radius: Option<f32>,
+}
+
+/// Why a file gave no tree.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The file cannot be opened.
+    #[error("cannot open {}: {source}", path.display())]
+    Open {
+        /// The path given.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Reading broke off.
+    #[error("cannot read line {line}: {source}")]
+    Read {
+        /// The line, from 1.
+        line: usize,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A line with fewer than seven columns.
+    #[error("line {line} has {found} columns; a node has 7: id type x y z radius parent")]
+    Columns {
+        /// The line, from 1.
+        line: usize,
+        /// Columns found.
+        found: usize,
+    },
+    /// A value that cannot be used.
+    #[error("line {line}: {column} is {value:?}; it must be {expected}")]
+    Value {
+        /// The line, from 1.
+        line: usize,
+        /// Name of the column.
+        column: &'static str,
+        /// What the file says, cut off after [`ReadError::SHOWN`] characters.
+        value: String,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// Two nodes with one id.
+    #[error("line {line}: id {id} was given to a node before; ids must differ")]
+    DuplicateId {
+        /// The later line, from 1.
+        line: usize,
+        /// The id.
+        id: i64,
+    },
+    /// A parent that the file does not have.
+    #[error("line {line}: no node has the parent's id {parent}; a root has parent -1")]
+    UnknownParent {
+        /// The line, from 1.
+        line: usize,
+        /// The parent's id.
+        parent: i64,
+    },
+    /// Nodes that are their own ancestors.
+    #[error("line {line}: node {id} is its own ancestor; cut the loop, SWC holds trees only")]
+    Cycle {
+        /// Line of one of them, from 1.
+        line: usize,
+        /// Its id.
+        id: i64,
+    },
+    /// Something that no tree can hold, such as too many nodes.
+    #[error(transparent)]
+    Tree(#[from] TreeError),
+}
+
+impl ReadError {
+    /// Most characters of a bad value that a message repeats.
+    pub const SHOWN: usize = 40;
+}
+
+/// Reads a tree from an SWC file. See [`read_swc`].
+///
+/// # Errors
+/// Those of [`read_swc`], and a file that cannot be opened.
+pub fn load_swc(path: impl AsRef<Path>, options: &SwcReadOptions) -> Result<VesselTree, ReadError> {
+    let path = path.as_ref();
+    let file = File::open(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
+    read_swc(BufReader::new(file), options)
+}
+
+/// Reads a tree, or forest, in SWC form. Lengths stay in the units of the file.
+///
+/// Ids may be any whole numbers from 0 on, in any order. Nodes keep the order of the file if parents come first there;
+/// otherwise they are ordered by their distance from the roots. The type column is checked and dropped, as are columns
+/// after the seventh. Comments may hold any bytes, a byte order mark is skipped, lines may end in CR LF.
+///
+/// # Errors
+/// The first line that is no node, names a node that is not there, or closes a loop; a radius that is not above zero,
+/// unless [`SwcReadOptions::least_radius`] lifts it.
+pub fn read_swc(input: impl BufRead, options: &SwcReadOptions) -> Result<VesselTree, ReadError> {
+    let samples = read_samples(input, options)?;
+    let parents = resolve_parents(&samples)?;
+    let order = parents_first(&samples, &parents)?;
+    let mut place = vec![NO_PARENT; samples.len()];
+    for (new, &old) in order.iter().enumerate() {
+        place[old as usize] = new as u32;
+    }
+    let parent_of = |&old: &u32| match parents[old as usize] {
+        NO_PARENT => NO_PARENT,
+        parent => place[parent as usize],
+    };
+    let sample = |&old: &u32| &samples[old as usize];
+    Ok(VesselTree::from_arrays(
+        order.iter().map(sample).map(|sample| sample.position).collect(),
+        order.iter().map(parent_of).collect(),
+        order.iter().map(sample).map(|sample| sample.radius).collect(),
+    )?)
+}
+
+/// One line of a file.
+struct Sample {
+    line: usize,
+    id: i64,
+    position: Vec3,
+    radius: f32,
+    parent: i64,
+}
+
+/// The parent's id of a root.
+const ROOT: i64 = -1;
+
+fn read_samples(mut input: impl BufRead, options: &SwcReadOptions) -> Result<Vec<Sample>, ReadError> {
+    let mut samples = Vec::new();
+    let mut bytes = Vec::new();
+    for line in 1.. {
+        bytes.clear();
+        let count = input.read_until(b'\n', &mut bytes).map_err(|source| ReadError::Read { line, source })?;
+        if count == 0 {
+            break;
+        }
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").filter(|_| line == 1).unwrap_or(&bytes);
+        // Comments in old files are in any encoding. What is not UTF-8 elsewhere fails as a number, with its line.
+        let text = String::from_utf8_lossy(text.split(|&byte| byte == b'#').next().unwrap_or_default());
+        if !text.trim().is_empty() {
+            samples.push(parse(&text, line, options)?);
+        }
+    }
+    if samples.len() >= NO_PARENT as usize {
+        return Err(TreeError::TooManyNodes { nodes: samples.len() }.into());
+    }
+    Ok(samples)
+}
+
+fn parse(text: &str, line: usize, options: &SwcReadOptions) -> Result<Sample, ReadError> {
+    let mut columns = [""; 7];
+    let mut found = 0;
+    for (column, value) in columns.iter_mut().zip(text.split_whitespace()) {
+        *column = value;
+        found += 1;
+    }
+    if found < columns.len() {
+        return Err(ReadError::Columns { line, found });
+    }
+    let [id, structure, x, y, z, radius, parent] = columns;
+    let bad = |column, value: &str, expected| ReadError::Value {
+        line,
+        column,
+        value: value.chars().take(ReadError::SHOWN).collect(),
+        expected,
+    };
+    let whole = |column, value: &str, least: i64, expected| {
+        value.parse().ok().filter(|&number: &i64| number >= least).ok_or_else(|| bad(column, value, expected))
+    };
+    let number = |column, value: &str| {
+        let number = value.parse().ok().filter(|number: &f32| number.is_finite());
+        number.ok_or_else(|| bad(column, value, "a finite number"))
+    };
+    let id = whole("id", id, 0, "a whole number of at least 0")?;
+    whole("type", structure, i64::MIN, "a whole number")?;
+    let position = Vec3::new(number("x", x)?, number("y", y)?, number("z", z)?);
+    let parent = whole("parent", parent, ROOT, "the id of a node, or -1 for a root")?;
+    let own = number("radius", radius)?;
+    let least = options.least_radius.filter(|least| least.is_finite()).unwrap_or(0.0);
+    let lifted = own.max(least);
+    if lifted <= 0.0 {
+        return Err(bad("radius", radius, "above 0, or be lifted by the option least_radius"));
+    }
+    Ok(Sample { line, id, position, radius: lifted, parent })
+}
+
+/// Index of every sample's parent in the file, [`NO_PARENT`] for a root.
+fn resolve_parents(samples: &[Sample]) -> Result<Vec<u32>, ReadError> {
+    let mut by_id: Vec<u32> = (0..samples.len() as u32).collect();
+    by_id.sort_by_key(|&index| samples[index as usize].id);
+    for pair in by_id.windows(2) {
+        let [first, second] = [pair[0], pair[1]].map(|index| &samples[index as usize]);
+        if first.id == second.id {
+            return Err(ReadError::DuplicateId { line: second.line, id: second.id });
+        }
+    }
+    let index_of = |sample: &Sample| {
+        if sample.parent == ROOT {
+            return Ok(NO_PARENT);
+        }
+        by_id
+            .binary_search_by_key(&sample.parent, |&index| samples[index as usize].id)
+            .map(|position| by_id[position])
+            .map_err(|_| ReadError::UnknownParent { line: sample.line, parent: sample.parent })
+    };
+    samples.iter().map(index_of).collect()
+}
+
+/// The samples' indices in an order with parents first: the file's own, or breadth first from the roots.
+fn parents_first(samples: &[Sample], parents: &[u32]) -> Result<Vec<u32>, ReadError> {
+    let indices = 0..parents.len() as u32;
+    if indices.clone().zip(parents).all(|(index, &parent)| parent == NO_PARENT || parent < index) {
+        return Ok(indices.collect());
+    }
+    let mut by_parent: Vec<u32> = indices.collect();
+    by_parent.sort_by_key(|&index| parents[index as usize]);
+    let children = |parent: u32| {
+        let start = by_parent.partition_point(|&index| parents[index as usize] < parent);
+        let end = by_parent.partition_point(|&index| parents[index as usize] <= parent);
+        &by_parent[start..end]
+    };
+    // NO_PARENT is above every index, so the roots are the children of NO_PARENT.
+    let mut order = children(NO_PARENT).to_vec();
+    let mut next = 0;
+    while next < order.len() {
+        order.extend_from_slice(children(order[next]));
+        next += 1;
+    }
+    if order.len() == parents.len() {
+        return Ok(order);
+    }
+    Err(cycle(samples, parents, &order))
+}
+
+/// Names a node on a loop, given the samples that the roots reach.
+fn cycle(samples: &[Sample], parents: &[u32], reached: &[u32]) -> ReadError {
+    let mut is_reached = vec![false; parents.len()];
+    for &index in reached {
+        is_reached[index as usize] = true;
+    }
+    let mut at = is_reached.iter().position(|&is_reached| !is_reached).unwrap_or_default();
+    // Who is not reached from a root has ancestors without end: after as many steps as there are nodes, a loop.
+    for _ in 0..parents.len() {
+        at = parents.get(at).map_or(at, |&parent| parent as usize);
+    }
+    ReadError::Cycle { line: samples[at].line, id: samples[at].id }
+}

@@ -1,0 +1,354 @@
+//! How the triangles of a mesh hang together once vertices at the same position count as one.
+
+use super::{TriangleMesh, doubled_normal, is_degenerate};
+use bevy_math::Vec3;
+use std::collections::VecDeque;
+
+/// Which vertices of a mesh are at the same position.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Welding {
+    vertices: Vec<u32>,
+    count: usize,
+}
+
+impl Welding {
+    /// The welded vertex that a vertex of the mesh belongs to. Welded vertices are numbered in order of appearance.
+    ///
+    /// # Panics
+    /// When the mesh has no such vertex.
+    pub fn vertex(&self, vertex: u32) -> usize {
+        self.vertices[vertex as usize] as usize
+    }
+
+    /// Number of different positions.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+}
+
+/// An edge between two welded vertices, in one of its triangles.
+#[derive(Clone, Copy, Debug)]
+struct EdgeUse {
+    /// The lower vertex in the upper half, the higher in the lower half.
+    key: u64,
+    /// The triangle.
+    triangle: u32,
+    /// Whether the triangle runs from the lower vertex to the higher.
+    forward: bool,
+}
+
+/// The welded triangles of a mesh and their edges.
+#[derive(Clone, Debug)]
+pub struct MeshTopology {
+    welding: Welding,
+    /// Corners as welded vertices; `None` for a degenerate triangle.
+    triangles: Vec<Option<[u32; 3]>>,
+    /// Every use of every edge, sorted by edge.
+    edges: Vec<EdgeUse>,
+}
+
+/// What stands in the welding table where no vertex is.
+const EMPTY: u32 = u32::MAX;
+
+impl TriangleMesh {
+    /// Finds vertices at exactly the same position (−0 and 0 are the same).
+    pub fn weld(&self) -> Welding {
+        let positions = self.positions();
+        // Open addressing over at least twice as many slots as vertices: a probe nearly always ends at once.
+        let mask = (2 * positions.len()).next_power_of_two() - 1;
+        let mut slots = vec![EMPTY; mask + 1];
+        let mut firsts: Vec<Vec3> = Vec::with_capacity(positions.len());
+        let mut vertices = Vec::with_capacity(positions.len());
+        for &position in positions {
+            let mut slot = hash(position) as usize & mask;
+            let welded = loop {
+                match slots[slot] {
+                    EMPTY => {
+                        slots[slot] = firsts.len() as u32;
+                        firsts.push(position);
+                        break slots[slot];
+                    }
+                    candidate if firsts[candidate as usize] == position => break candidate,
+                    _ => slot = (slot + 1) & mask,
+                }
+            };
+            vertices.push(welded);
+        }
+        Welding { vertices, count: firsts.len() }
+    }
+
+    /// A copy in which every position occurs once, and no triangle is degenerate or repeats an earlier one.
+    ///
+    /// Texture coordinates are dropped: a welded vertex of a seam would need several.
+    #[must_use]
+    pub fn welded(&self) -> Self {
+        let welding = self.weld();
+        let mut positions = vec![Vec3::ZERO; welding.count()];
+        for (vertex, &position) in self.positions().iter().enumerate() {
+            positions[welding.vertex(vertex as u32)] = position;
+        }
+        let triangles: Vec<[u32; 3]> = (0..self.triangles().len())
+            .filter(|&triangle| !self.is_degenerate(triangle))
+            .map(|triangle| self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32))
+            .collect();
+        Self { positions, triangles: without_repeats(triangles), uvs: None }
+    }
+
+    /// The welded edges of the mesh, for every question about how it hangs together.
+    pub fn topology(&self) -> MeshTopology {
+        let welding = self.weld();
+        let mut edges = Vec::with_capacity(3 * self.triangles().len());
+        let mut triangles = Vec::with_capacity(self.triangles().len());
+        for (triangle, corners) in self.triangles().iter().enumerate() {
+            if is_degenerate(self.corners(triangle)) {
+                triangles.push(None);
+                continue;
+            }
+            let corners = corners.map(|vertex| welding.vertex(vertex) as u32);
+            triangles.push(Some(corners));
+            for side in 0..3 {
+                let (from, to) = (corners[side], corners[(side + 1) % 3]);
+                let key = u64::from(from.min(to)) << 32 | u64::from(from.max(to));
+                edges.push(EdgeUse { key, triangle: triangle as u32, forward: from < to });
+            }
+        }
+        edges.sort_unstable_by_key(|edge| (edge.key, edge.triangle, edge.forward));
+        MeshTopology { welding, triangles, edges }
+    }
+
+    /// Whether no edge has just one triangle, after welding: the mesh has an inside.
+    ///
+    /// For more than one question ask [`topology`](Self::topology) once.
+    pub fn is_closed(&self) -> bool {
+        self.topology().is_closed()
+    }
+}
+
+impl MeshTopology {
+    /// Which vertices are at the same position.
+    pub fn welding(&self) -> &Welding {
+        &self.welding
+    }
+
+    /// Number of triangles that have no area.
+    pub fn degenerate_triangles(&self) -> usize {
+        self.triangles.iter().filter(|corners| corners.is_none()).count()
+    }
+
+    /// Number of edges.
+    pub fn edges(&self) -> usize {
+        self.fans().count()
+    }
+
+    /// Number of edges with one triangle only: 0 where the mesh is closed.
+    pub fn boundary_edges(&self) -> usize {
+        self.fans().filter(|fan| fan.len() == 1).count()
+    }
+
+    /// Number of edges with more than two triangles.
+    pub fn non_manifold_edges(&self) -> usize {
+        self.fans().filter(|fan| fan.len() > 2).count()
+    }
+
+    /// Whether no edge has just one triangle.
+    pub fn is_closed(&self) -> bool {
+        self.boundary_edges() == 0
+    }
+
+    /// Vertices − edges + triangles, over what non-degenerate triangles use: 2 for a ball, 0 for a torus.
+    pub fn euler_characteristic(&self) -> i64 {
+        let mut used = vec![false; self.welding.count()];
+        for &vertex in self.triangles.iter().flatten().flatten() {
+            used[vertex as usize] = true;
+        }
+        let vertices = used.iter().filter(|&&used| used).count();
+        vertices as i64 - self.edges() as i64 + self.triangles.iter().flatten().count() as i64
+    }
+
+    /// Numbers the connected parts of the mesh: for every triangle the part it belongs to, `None` where it is
+    /// degenerate, and how many parts there are. Triangles are connected across shared edges.
+    pub fn components(&self) -> (Vec<Option<u32>>, usize) {
+        let patches = self.patches(|_| true, |_, _, _| {});
+        (patches.of_triangle, patches.count)
+    }
+
+    /// Which triangles face the other way than the part of the surface around them.
+    ///
+    /// Orientation spreads across edges that exactly two triangles share. Of the two ways in which such a part can face,
+    /// the one that most of its area already has is kept, so a mesh that is consistent stays as it is.
+    pub fn misoriented(&self, mesh: &TriangleMesh) -> Vec<bool> {
+        let mut flip = vec![false; self.triangles.len()];
+        let patches = self.patches(|fan| fan.len() == 2, |from, to, same_way| flip[to] = flip[from] != same_way);
+        // Area of each part that would be flipped, less the area that would stay.
+        let mut balance = vec![0.0; patches.count];
+        for (triangle, patch) in patches.of_triangle.iter().enumerate() {
+            if let Some(patch) = patch {
+                let area = doubled_normal(mesh.corners(triangle)).length();
+                balance[*patch as usize] += if flip[triangle] { area } else { -area };
+            }
+        }
+        for (triangle, patch) in patches.of_triangle.iter().enumerate() {
+            if patch.is_some_and(|patch| balance[patch as usize] > 0.0) {
+                flip[triangle] = !flip[triangle];
+            }
+        }
+        flip
+    }
+
+    /// Parts of the surface joined by edges with exactly two triangles, and whether each part is closed.
+    pub(crate) fn manifold_patches(&self) -> (Patches, Vec<bool>) {
+        let patches = self.patches(|fan| fan.len() == 2, |_, _, _| {});
+        let mut closed = vec![true; patches.count];
+        for edge in self.fans().filter(|fan| fan.len() == 1).flatten() {
+            if let Some(patch) = patches.of_triangle[edge.triangle as usize] {
+                closed[patch as usize] = false;
+            }
+        }
+        (patches, closed)
+    }
+
+    /// The uses of each edge.
+    fn fans(&self) -> impl Iterator<Item = &[EdgeUse]> {
+        self.edges.chunk_by(|a, b| a.key == b.key)
+    }
+
+    /// Breadth-first walk over the triangles, across the edges that `joins` lets through.
+    ///
+    /// `visit(from, to, same_way)` is told of every triangle that is reached, from which one, and whether both run along
+    /// their common edge in the same direction, which neighbours that face the same way don't.
+    fn patches(&self, joins: impl Fn(&[EdgeUse]) -> bool, mut visit: impl FnMut(usize, usize, bool)) -> Patches {
+        // Where each triangle's sides are found among the sorted edges.
+        let mut sides = vec![[(0u32, 0u32); 3]; self.triangles.len()];
+        let mut filled = vec![0u8; self.triangles.len()];
+        let mut start = 0u32;
+        for fan in self.fans() {
+            let end = start + fan.len() as u32;
+            for edge in fan {
+                let triangle = edge.triangle as usize;
+                sides[triangle][usize::from(filled[triangle])] = (start, end);
+                filled[triangle] += 1;
+            }
+            start = end;
+        }
+        let mut of_triangle: Vec<Option<u32>> = vec![None; self.triangles.len()];
+        let mut count = 0u32;
+        let mut queue = VecDeque::new();
+        for seed in 0..self.triangles.len() {
+            if self.triangles[seed].is_none() || of_triangle[seed].is_some() {
+                continue;
+            }
+            of_triangle[seed] = Some(count);
+            queue.push_back(seed);
+            while let Some(from) = queue.pop_front() {
+                for (start, end) in sides[from] {
+                    let fan = &self.edges[start as usize..end as usize];
+                    if !joins(fan) {
+                        continue;
+                    }
+                    let forward = fan.iter().any(|edge| edge.triangle as usize == from && edge.forward);
+                    for edge in fan {
+                        let to = edge.triangle as usize;
+                        if of_triangle[to].is_none() {
+                            of_triangle[to] = Some(count);
+                            visit(from, to, edge.forward == forward);
+                            queue.push_back(to);
+                        }
+                    }
+                }
+            }
+            count += 1;
+        }
+        Patches { of_triangle, count: count as usize }
+    }
+}
+
+/// Parts of a surface.
+pub(crate) struct Patches {
+    /// The part of every triangle, `None` where it is degenerate.
+    pub of_triangle: Vec<Option<u32>>,
+    /// Number of parts.
+    pub count: usize,
+}
+
+/// Drops triangles whose three vertices an earlier triangle has too, in whichever order.
+fn without_repeats(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    let mut keys: Vec<([u32; 3], u32)> = triangles
+        .iter()
+        .enumerate()
+        .map(|(number, &corners)| {
+            let mut sorted = corners;
+            sorted.sort_unstable();
+            (sorted, number as u32)
+        })
+        .collect();
+    keys.sort_unstable();
+    let mut repeats: Vec<u32> = keys.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect();
+    repeats.sort_unstable();
+    let mut number = 0;
+    triangles.retain(|_| {
+        number += 1;
+        repeats.binary_search(&(number - 1)).is_err()
+    });
+    triangles
+}
+
+fn hash(position: Vec3) -> u64 {
+    // Adding 0 turns −0 into 0.
+    let [x, y, z] = (position + Vec3::ZERO).to_array().map(|value| u64::from(value.to_bits()));
+    let mixed = (x ^ y.rotate_left(21) ^ z.rotate_left(42)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed = (mixed ^ (mixed >> 29) ^ z).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    mixed ^ (mixed >> 32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesis::mesh::MeshError;
+
+    /// A tetrahedron in which every triangle has vertices of its own.
+    fn soup() -> Result<TriangleMesh, MeshError> {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let positions = faces.iter().flatten().map(|&i: &usize| corners[i]).collect();
+        TriangleMesh::new(positions, (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), None)
+    }
+
+    #[test]
+    fn a_soup_is_closed_once_welded() -> Result<(), MeshError> {
+        let topology = soup()?.topology();
+        assert_eq!(topology.welding().count(), 4);
+        assert_eq!((topology.edges(), topology.boundary_edges(), topology.non_manifold_edges()), (6, 0, 0));
+        assert!(topology.is_closed());
+        assert_eq!(topology.euler_characteristic(), 2);
+        assert_eq!(topology.components().1, 1);
+        assert!((soup()?.signed_volume() - 1.0 / 6.0).abs() < 1e-7);
+        assert_eq!(soup()?.welded().positions().len(), 4);
+        // Normals of the four vertices don't split.
+        let normals = soup()?.vertex_normals();
+        assert_eq!(normals[0], normals[3]);
+        Ok(())
+    }
+
+    #[test]
+    fn negative_zero_welds() -> Result<(), MeshError> {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(-0.0, 0.0, -0.0), Vec3::Y, Vec3::NEG_X];
+        let mesh = TriangleMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]], None)?;
+        assert_eq!(mesh.weld().count(), 4);
+        assert_eq!(mesh.topology().components().1, 1);
+        assert_eq!(mesh.topology().boundary_edges(), 4);
+        assert!(!mesh.is_closed());
+        Ok(())
+    }
+
+    #[test]
+    fn the_odd_triangle_out_is_found() -> Result<(), MeshError> {
+        let mesh = soup()?;
+        assert_eq!(mesh.topology().misoriented(&mesh), [false; 4]);
+        let mesh = mesh.with_flipped(|triangle| triangle == 1);
+        assert_eq!(mesh.topology().misoriented(&mesh), [false, true, false, false]);
+        let inward = mesh.with_flipped(|triangle| triangle != 1);
+        assert_eq!(inward.topology().misoriented(&inward), [false; 4]);
+        assert!(inward.signed_volume() < 0.0);
+        Ok(())
+    }
+}

@@ -1,0 +1,374 @@
+//! Tissues of simple shape, sampled and measured exactly: disc and rectangle are surfaces; ball, box and ellipsoid are
+//! solids.
+
+use super::{
+    Extent, Tissue, TissuePoint,
+    error::{TissueError, finite_point, positive},
+};
+use crate::synthesis::rng::VesselRng;
+use bevy_math::{DVec3, Vec2, Vec3, bounding::Aabb3d};
+use rand::RngExt;
+use std::f32::consts::PI;
+
+/// Rounding that a shape's own points are forgiven, relative to its size and distance from the origin.
+const ROUNDING: f32 = 4.0 * f32::EPSILON;
+
+/// Most tries at a uniform point by rejection. A ball takes half of its tries, so this many fail once in 10²⁰ draws.
+const TRIES: u32 = 64;
+
+/// Distance within which a point counts as part of a shape.
+fn tolerance(center: Vec3, size: f32) -> f32 {
+    ROUNDING * (center.abs().max_element() + size)
+}
+
+/// A point of a solid, where there is no normal.
+fn inside(position: Vec3) -> TissuePoint {
+    TissuePoint { position, normal: Vec3::ZERO }
+}
+
+/// A number drawn evenly from −1 to 1.
+fn signed(rng: &mut VesselRng) -> f32 {
+    2.0 * rng.random::<f32>() - 1.0
+}
+
+/// A point drawn evenly from the unit disc. Rejection takes fewer operations than a root, a sine and a cosine.
+pub(super) fn in_unit_disc(rng: &mut VesselRng) -> Option<Vec2> {
+    (0..TRIES).map(|_| Vec2::new(signed(rng), signed(rng))).find(|point| point.length_squared() <= 1.0)
+}
+
+/// A point drawn evenly from the unit ball.
+pub(super) fn in_unit_ball(rng: &mut VesselRng) -> Option<Vec3> {
+    (0..TRIES).map(|_| Vec3::new(signed(rng), signed(rng), signed(rng))).find(|point| point.length_squared() <= 1.0)
+}
+
+/// A flat disc, the tissue of the paper's examples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disc {
+    center: Vec3,
+    normal: Vec3,
+    /// Perpendicular unit vectors in the disc's plane.
+    axes: [Vec3; 2],
+    radius: f32,
+}
+
+impl Disc {
+    /// A disc around `center`, of any `normal` that is not zero.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite, a normal without direction, a radius that is not above 0.
+    pub fn new(center: Vec3, normal: Vec3, radius: f32) -> Result<Self, TissueError> {
+        finite_point("the disc's centre", center)?;
+        let length = positive("the length of the disc's normal", finite_point("the disc's normal", normal)?.length())?;
+        let radius = positive("the disc's radius", radius)?;
+        let normal = normal / length;
+        // For the usual disc these are X and Y.
+        let (x, y) = normal.any_orthonormal_pair();
+        Ok(Self { center, normal, axes: [x, y], radius })
+    }
+
+    /// A disc in the plane z = 0 around the origin.
+    ///
+    /// # Errors
+    /// A radius that is not finite and above 0.
+    pub fn flat(radius: f32) -> Result<Self, TissueError> {
+        Self::new(Vec3::ZERO, Vec3::Z, radius)
+    }
+
+    /// Its centre.
+    pub fn center(&self) -> Vec3 {
+        self.center
+    }
+
+    /// Its unit normal.
+    pub fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
+    /// Its radius.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    /// Coordinates of a point in the disc's plane, and its height over the plane.
+    fn local(&self, point: Vec3) -> (Vec2, f32) {
+        let offset = point - self.center;
+        (Vec2::new(offset.dot(self.axes[0]), offset.dot(self.axes[1])), offset.dot(self.normal))
+    }
+
+    fn at(&self, local: Vec2) -> Vec3 {
+        self.center + self.axes[0] * local.x + self.axes[1] * local.y
+    }
+}
+
+impl Tissue for Disc {
+    fn bounds(&self) -> Aabb3d {
+        // Along each axis a disc reaches as far as the sine of the angle between axis and normal says.
+        let half = (Vec3::ONE - self.normal * self.normal).max(Vec3::ZERO).map(f32::sqrt) * self.radius;
+        Aabb3d { min: (self.center - half).into(), max: (self.center + half).into() }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::Area(PI * self.radius * self.radius)
+    }
+
+    fn contains(&self, point: Vec3) -> bool {
+        let (local, height) = self.local(point);
+        let tolerance = tolerance(self.center, self.radius);
+        height.abs() <= tolerance && local.length() <= self.radius + tolerance
+    }
+
+    fn closest_point(&self, point: Vec3) -> TissuePoint {
+        let position = self.at(self.local(point).0.clamp_length_max(self.radius));
+        TissuePoint { position, normal: self.normal }
+    }
+
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
+        Some(self.at(in_unit_disc(rng)? * self.radius))
+    }
+}
+
+/// A flat rectangle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rectangle {
+    center: Vec3,
+    /// Perpendicular unit vectors along the sides.
+    axes: [Vec3; 2],
+    half: Vec2,
+}
+
+/// Cosine of the angle between two sides below which they count as perpendicular.
+const PERPENDICULAR: f32 = 1.0e-4;
+
+impl Rectangle {
+    /// A rectangle around `center`; `half_x` and `half_y` lead from there to the middles of two sides.
+    ///
+    /// Its normal is `half_x` × `half_y`.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite, a side without length, sides that are not perpendicular.
+    pub fn new(center: Vec3, half_x: Vec3, half_y: Vec3) -> Result<Self, TissueError> {
+        finite_point("the rectangle's centre", center)?;
+        let x =
+            positive("half the rectangle's first side", finite_point("the rectangle's first side", half_x)?.length())?;
+        let y = positive(
+            "half the rectangle's second side",
+            finite_point("the rectangle's second side", half_y)?.length(),
+        )?;
+        let (axis_x, axis_y) = (half_x / x, half_y / y);
+        let cosine = axis_x.dot(axis_y);
+        if !(cosine.abs() <= PERPENDICULAR) {
+            return Err(TissueError::NotPerpendicular { cosine });
+        }
+        Ok(Self { center, axes: [axis_x, (axis_y - axis_x * cosine).normalize()], half: Vec2::new(x, y) })
+    }
+
+    /// A rectangle of this size in the plane z = 0 around the origin.
+    ///
+    /// # Errors
+    /// A size that is not finite and above 0.
+    pub fn flat(size: Vec2) -> Result<Self, TissueError> {
+        Self::new(Vec3::ZERO, Vec3::X * (size.x / 2.0), Vec3::Y * (size.y / 2.0))
+    }
+
+    /// Its unit normal.
+    pub fn normal(&self) -> Vec3 {
+        self.axes[0].cross(self.axes[1])
+    }
+
+    fn at(&self, local: Vec2) -> Vec3 {
+        self.center + self.axes[0] * local.x + self.axes[1] * local.y
+    }
+
+    fn nearest(&self, point: Vec3) -> Vec3 {
+        let offset = point - self.center;
+        self.at(Vec2::new(offset.dot(self.axes[0]), offset.dot(self.axes[1])).clamp(-self.half, self.half))
+    }
+}
+
+impl Tissue for Rectangle {
+    fn bounds(&self) -> Aabb3d {
+        let half = self.axes[0].abs() * self.half.x + self.axes[1].abs() * self.half.y;
+        Aabb3d { min: (self.center - half).into(), max: (self.center + half).into() }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::Area(4.0 * self.half.x * self.half.y)
+    }
+
+    fn contains(&self, point: Vec3) -> bool {
+        point.distance(self.nearest(point)) <= tolerance(self.center, self.half.length())
+    }
+
+    fn closest_point(&self, point: Vec3) -> TissuePoint {
+        TissuePoint { position: self.nearest(point), normal: self.normal() }
+    }
+
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
+        Some(self.at(self.half * Vec2::new(signed(rng), signed(rng))))
+    }
+}
+
+/// A solid ball.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ball {
+    center: Vec3,
+    radius: f32,
+}
+
+impl Ball {
+    /// A ball around `center`.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite, a radius that is not above 0.
+    pub fn new(center: Vec3, radius: f32) -> Result<Self, TissueError> {
+        let center = finite_point("the ball's centre", center)?;
+        Ok(Self { center, radius: positive("the ball's radius", radius)? })
+    }
+
+    /// Its centre.
+    pub fn center(&self) -> Vec3 {
+        self.center
+    }
+
+    /// Its radius.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+}
+
+impl Tissue for Ball {
+    fn bounds(&self) -> Aabb3d {
+        Aabb3d { min: (self.center - self.radius).into(), max: (self.center + self.radius).into() }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::Volume(4.0 / 3.0 * PI * self.radius * self.radius * self.radius)
+    }
+
+    fn contains(&self, point: Vec3) -> bool {
+        point.distance(self.center) <= self.radius + tolerance(self.center, self.radius)
+    }
+
+    fn closest_point(&self, point: Vec3) -> TissuePoint {
+        inside(self.center + (point - self.center).clamp_length_max(self.radius))
+    }
+
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
+        Some(self.center + in_unit_ball(rng)? * self.radius)
+    }
+}
+
+/// A solid box along the axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cuboid {
+    center: Vec3,
+    half: Vec3,
+}
+
+impl Cuboid {
+    /// A box around `center` with these full side lengths.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite, a side that is not above 0.
+    pub fn new(center: Vec3, size: Vec3) -> Result<Self, TissueError> {
+        let center = finite_point("the box's centre", center)?;
+        for side in size.to_array() {
+            positive("a side of the box", side)?;
+        }
+        Ok(Self { center, half: size / 2.0 })
+    }
+}
+
+impl Tissue for Cuboid {
+    fn bounds(&self) -> Aabb3d {
+        Aabb3d { min: (self.center - self.half).into(), max: (self.center + self.half).into() }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::Volume(8.0 * self.half.element_product())
+    }
+
+    fn contains(&self, point: Vec3) -> bool {
+        let tolerance = tolerance(self.center, self.half.max_element());
+        (point - self.center).abs().cmple(self.half + tolerance).all()
+    }
+
+    fn closest_point(&self, point: Vec3) -> TissuePoint {
+        inside(self.center + (point - self.center).clamp(-self.half, self.half))
+    }
+
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
+        Some(self.center + self.half * Vec3::new(signed(rng), signed(rng), signed(rng)))
+    }
+}
+
+/// A solid ellipsoid along the axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ellipsoid {
+    center: Vec3,
+    half: Vec3,
+}
+
+impl Ellipsoid {
+    /// An ellipsoid around `center` with these half axes.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite, a half axis that is not above 0.
+    pub fn new(center: Vec3, half_axes: Vec3) -> Result<Self, TissueError> {
+        let center = finite_point("the ellipsoid's centre", center)?;
+        for axis in half_axes.to_array() {
+            positive("a half axis of the ellipsoid", axis)?;
+        }
+        Ok(Self { center, half: half_axes })
+    }
+}
+
+impl Tissue for Ellipsoid {
+    fn bounds(&self) -> Aabb3d {
+        Aabb3d { min: (self.center - self.half).into(), max: (self.center + self.half).into() }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::Volume(4.0 / 3.0 * PI * self.half.element_product())
+    }
+
+    fn contains(&self, point: Vec3) -> bool {
+        let share = tolerance(self.center, self.half.max_element()) / self.half.min_element();
+        ((point - self.center) / self.half).length() <= 1.0 + share
+    }
+
+    fn closest_point(&self, point: Vec3) -> TissuePoint {
+        if self.contains(point) {
+            return inside(point);
+        }
+        inside(self.center + nearest_on_ellipsoid((point - self.center).as_dvec3(), self.half.as_dvec3()).as_vec3())
+    }
+
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
+        // A uniform ball stays uniform when it is stretched.
+        Some(self.center + in_unit_ball(rng)? * self.half)
+    }
+}
+
+/// The point of an ellipsoid around the origin that is nearest to a point outside it.
+///
+/// It is x = e²·p / (t + e²) for the t that satisfies F(t) = Σ (e·p / (t + e²))² − 1 = 0 (Eberly, "Distance from a Point
+/// to an Ellipse, an Ellipsoid, or a Hyperellipsoid", 2013). Outside, t is above 0, where F falls and is convex, so that
+/// Newton's steps from below never overshoot.
+fn nearest_on_ellipsoid(point: DVec3, half: DVec3) -> DVec3 {
+    let squares = half * half;
+    // At this t one term alone is 1, so F is not below 0.
+    let mut t = (half * point.abs() - squares).max_element().max(0.0);
+    for _ in 0..100 {
+        let ratios = half * point / (squares + t);
+        let value = ratios.length_squared() - 1.0;
+        let slope = -2.0 * (ratios * ratios / (squares + t)).element_sum();
+        let next = t - value / slope;
+        // Also where the slope is 0 and `next` no number.
+        if !(next > t) {
+            break;
+        }
+        t = next;
+    }
+    squares * point / (squares + t)
+}
