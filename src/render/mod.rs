@@ -92,9 +92,7 @@ impl Plugin for SegmentRenderPlugin {
             )
             .add_systems(
                 PostUpdate,
-                (segments::attach_buffers, segments::apply_visibility, segments::update_segments)
-                    .chain()
-                    .in_set(SegmentSystems),
+                (segments::attach_buffers, segments::update_segments).chain().in_set(SegmentSystems),
             );
         build_render_app(app);
     }

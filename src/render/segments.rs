@@ -36,9 +36,8 @@ pub struct SegmentBuffer {
     /// Chunk entities, in the order of their slots.
     chunks: Vec<Entity>,
     colors: SegmentColors,
-    /// The appearance that `colors` and the visibility follow, `None` at first.
+    /// The appearance that `colors` follow, `None` at first.
     look: Option<Look>,
-    shown: Option<bool>,
     warned_of_limit: bool,
 }
 
@@ -82,11 +81,7 @@ impl Look {
         if appearance.coloring != SegmentColoring::System {
             return Self::Ramp(appearance.coloring);
         }
-        let color = match system {
-            System::Arterial => appearance.arterial,
-            System::Venous => appearance.venous,
-        };
-        Self::Uniform(color.to_linear().to_f32_array_no_alpha())
+        Self::Uniform(appearance.color(system).to_linear().to_f32_array_no_alpha())
     }
 
     fn colors(self) -> SegmentColors {
@@ -115,14 +110,13 @@ pub(super) fn attach_buffers(
         let buffer = buffers.add(buffer);
         let extension = SegmentExtension { segments: buffer.clone() };
         let material = materials.add(SegmentMaterial { base: templates.of(system.0).clone(), extension });
-        commands.entity(entity).insert_if_new((Transform::default(), Visibility::default())).insert(SegmentBuffer {
+        commands.entity(entity).insert(SegmentBuffer {
             buffer,
             material,
             capacity,
             chunks: Vec::new(),
             colors: SegmentColors::Uniform([1.0; 3]),
             look: None,
-            shown: None,
             warned_of_limit: false,
         });
     }
@@ -135,26 +129,6 @@ pub(super) fn detach_buffer(removed: On<Remove, Vessels>, mut commands: Commands
             commands.entity(chunk).try_despawn();
         }
         commands.entity(removed.entity).try_remove::<SegmentBuffer>();
-    }
-}
-
-/// Shows and hides systems as their organ's appearance says. A visibility set by the user stays until that changes.
-pub(super) fn apply_visibility(
-    mut vessels: Query<(&VesselSystem, &VesselsOf, &mut SegmentBuffer, &mut Visibility)>,
-    appearances: Query<Ref<VesselAppearance>>,
-) {
-    for (system, organ, mut segments, mut visibility) in &mut vessels {
-        let Ok(appearance) = appearances.get(organ.0) else { continue };
-        if segments.shown.is_some() && !appearance.is_changed() {
-            continue;
-        }
-        let show = match system.0 {
-            System::Arterial => appearance.show_arterial,
-            System::Venous => appearance.show_venous,
-        };
-        if segments.shown.replace(show) != Some(show) {
-            visibility.set_if_neq(if show { Visibility::Inherited } else { Visibility::Hidden });
-        }
     }
 }
 

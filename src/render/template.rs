@@ -3,6 +3,7 @@
 use crate::plugin::SegmentChanges;
 use bevy::{
     asset::RenderAssetUsages,
+    math::ops,
     mesh::{Indices, Mesh, PrimitiveTopology},
 };
 use std::f32::consts::TAU;
@@ -66,7 +67,7 @@ impl Template {
     fn push_ring(&mut self, slot: f32, sides: u32, end: f32, latitude: f32) -> u32 {
         let first = self.around.len() as u32;
         for side in 0..sides {
-            let (sin, cos) = (TAU * side as f32 / sides as f32).sin_cos();
+            let (sin, cos) = ops::sin_cos(TAU * side as f32 / sides as f32);
             self.push_vertex(slot, [cos, sin, end], latitude);
         }
         first
