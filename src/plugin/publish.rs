@@ -3,7 +3,7 @@
 //! Only new and changed nodes are touched. A restart keeps the entities, so whatever else is on them stays.
 
 use crate::plugin::{
-    components::{OrganVessels, Vasculature, VesselAppearance, VesselSystem, VesselsOf},
+    components::{GrowthProgress, OrganVessels, Vasculature, VesselAppearance, VesselSystem, VesselsOf},
     growth_state::GrowthState,
     segment_changes::SegmentChanges,
     vessels::Vessels,
@@ -77,7 +77,7 @@ pub(crate) fn show_systems(
 pub(crate) fn remove_vessels(removed: On<Remove, Vasculature>, mut commands: Commands) {
     // Silenced, since the organ itself may have been despawned; the vessels follow it by their relationship then.
     commands.entity(removed.entity).queue_silenced(|mut organ: EntityWorldMut| {
-        organ.despawn_related::<OrganVessels>().remove::<GrowthState>();
+        organ.despawn_related::<OrganVessels>().remove::<(GrowthState, GrowthProgress)>();
     });
 }
 

@@ -10,7 +10,12 @@ use crate::plugin::{
     messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganError},
     organ_mesh::{MeshCopy, OrganMeshError, copy_mesh},
 };
-use crate::synthesis::{colonization::Growth, mesh::TriangleMesh, tissue::{Tissue, TissueSettings}, tree::System};
+use crate::synthesis::{
+    colonization::Growth,
+    mesh::TriangleMesh,
+    tissue::{Tissue, TissueSettings},
+    tree::System,
+};
 use bevy::{
     asset::{AssetEvent, AssetId, AssetServer, Assets, LoadState},
     ecs::{
@@ -110,8 +115,13 @@ fn mesh_news(event: &AssetEvent<Mesh>) -> Option<(AssetId<Mesh>, bool)> {
 
 /// The slow part of the preparation, as a pure function of what was copied from the mesh.
 fn prepare(copy: MeshCopy, settings: &TissueSettings) -> Prepared {
-    let mesh = TriangleMesh::new(copy.positions, copy.triangles).map_err(OrganMeshError::from)?;
-    Ok(settings.build(mesh)?)
+    let mesh = TriangleMesh::new(copy.positions, copy.triangles, None).map_err(OrganMeshError::from)?;
+    Ok(match settings.mode {
+        crate::synthesis::tissue::TissueMode::Surface => Arc::new(crate::synthesis::tissue::MeshSurface::new(mesh)?),
+        crate::synthesis::tissue::TissueMode::Volume => {
+            Arc::new(crate::synthesis::tissue::MeshVolume::new(&mesh, 128)?)
+        }
+    })
 }
 
 impl OrganMeshes<'_> {
@@ -209,7 +219,7 @@ impl GrowthProgress {
             step: growth.map_or(0, Growth::steps_done),
             steps: growth.map_or(0, |growth| growth.settings().steps),
             nodes: of_systems(|growth, system| growth.tree(system).len()),
-            drains: of_systems(Growth::drains),
+            drains: of_systems(Growth::drains_left),
             grow_time,
         }
     }

@@ -5,11 +5,7 @@ use crate::synthesis::{
     colonization::Growth,
     tree::{NO_PARENT, NodeId, System, VesselTree},
 };
-use bevy::{
-    camera::primitives::Aabb,
-    ecs::component::Component,
-    math::{Vec3, Vec3A},
-};
+use bevy::{camera::primitives::Aabb, ecs::component::Component, math::Vec3};
 
 /// The vessels of one system of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
 /// off its surface where the settings say so.
@@ -82,7 +78,7 @@ impl Vessels {
 
     fn append(&mut self, growth: &Growth, system: System, node: usize) {
         let tree = growth.tree(system);
-        let (position, radius) = (growth.lifted_position(system, node), tree.radii()[node]);
+        let (position, radius) = (growth.lifted_position(system, NodeId(node as u32)), tree.radii()[node]);
         let parent = tree.parents()[node];
         let sibling = match parent {
             NO_PARENT => {
@@ -101,7 +97,7 @@ impl Vessels {
     }
 
     fn update(&mut self, growth: &Growth, system: System, node: usize) {
-        self.tree.positions_mut()[node] = growth.lifted_position(system, node);
+        self.tree.positions_mut()[node] = growth.lifted_position(system, NodeId(node as u32));
         self.tree.radii_mut()[node] = growth.tree(system).radii()[node];
         self.enclose(node);
     }
