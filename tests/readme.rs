@@ -109,6 +109,20 @@ fn the_rooms_of_the_architecture_exist() {
     }
 }
 
+#[test]
+fn every_room_is_in_the_picture() {
+    let page = read("ARCHITECTURE.md");
+    let rooms = page.split("## Rooms").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("a list of rooms");
+    let named: Vec<&str> = rooms.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    for source in files("src") {
+        let room = Path::new(&source).with_extension("");
+        for part in room.components().skip(1).map(|part| part.as_os_str().to_string_lossy()) {
+            let known = matches!(&*part, "mod" | "tests") || named.contains(&&*part);
+            assert!(known, "{source}: the picture in ARCHITECTURE.md does not show {part}");
+        }
+    }
+}
+
 /// Every file below a folder of the project, as a path with `/` from the project's root.
 fn files(folder: &str) -> Vec<String> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
