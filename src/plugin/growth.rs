@@ -80,13 +80,18 @@ pub(crate) fn grow(
     }
     let waiting = organs.iter().filter(|(_, control, state, _)| state.may_step(**control));
     let turns = turns(waiting.map(|(organ, ..)| organ).collect(), *last);
-    steps += share_out(*budget, turns, || start.elapsed(), |organ| {
-        *last = Some(organ);
-        organs.get_mut(organ).is_ok_and(|(_, control, mut state, mut progress)| {
-            step(&mut state, &mut progress);
-            state.may_step(*control)
-        })
-    });
+    steps += share_out(
+        *budget,
+        turns,
+        || start.elapsed(),
+        |organ| {
+            *last = Some(organ);
+            organs.get_mut(organ).is_ok_and(|(_, control, mut state, mut progress)| {
+                step(&mut state, &mut progress);
+                state.may_step(*control)
+            })
+        },
+    );
     *frame = GrowthFrame { steps, time: start.elapsed() };
     for (organ, _, state, mut progress) in &mut organs {
         if progress.phase == GrowthPhase::Growing && end_if_finished(&state, &mut progress) {
@@ -167,10 +172,15 @@ mod tests {
         let budget = GrowthBudget::Time(Duration::from_millis(2));
         let count = |step_time: Duration| {
             clock.set(Duration::ZERO);
-            share_out(budget, vec![()], || clock.get(), |()| {
-                clock.set(clock.get() + step_time);
-                true
-            })
+            share_out(
+                budget,
+                vec![()],
+                || clock.get(),
+                |()| {
+                    clock.set(clock.get() + step_time);
+                    true
+                },
+            )
         };
         assert_eq!(count(Duration::from_micros(500)), 4);
         assert_eq!(count(Duration::from_micros(1999)), 2);
@@ -193,11 +203,16 @@ mod tests {
         let mut last = None;
         for frame in 1..=30 {
             let growing = (0..3).filter(|&organ| left[organ] > 0).collect();
-            share_out(GrowthBudget::Steps(2), turns(growing, last), || Duration::ZERO, |organ: usize| {
-                last = Some(organ);
-                left[organ] -= 1;
-                left[organ] > 0
-            });
+            share_out(
+                GrowthBudget::Steps(2),
+                turns(growing, last),
+                || Duration::ZERO,
+                |organ: usize| {
+                    last = Some(organ);
+                    left[organ] -= 1;
+                    left[organ] > 0
+                },
+            );
             assert!((left[1] - left[2]).abs() <= 1, "frame {frame}: {left:?}");
         }
         assert_eq!(left[0], 0);

@@ -5,8 +5,17 @@ use crate::plugin::{
     messages::{GrowthAction, OrganError},
     organ_mesh::OrganMeshError,
 };
-use crate::synthesis::{colonization::{Growth, SettingsWarning}, tissue::Tissue, tree::System};
-use bevy::{asset::AssetId, ecs::component::Component, mesh::Mesh, tasks::{Task, futures::check_ready}};
+use crate::synthesis::{
+    colonization::{Growth, SettingsWarning},
+    tissue::Tissue,
+    tree::System,
+};
+use bevy::{
+    asset::AssetId,
+    ecs::component::Component,
+    mesh::Mesh,
+    tasks::{Task, futures::check_ready},
+};
 use std::sync::Arc;
 
 /// A tissue, or why there is none.
@@ -246,7 +255,11 @@ fn difference(
 ) -> Need {
     match followed {
         Some((old, old_mesh)) if old.tissue == wish.tissue && *old_mesh == mesh => {
-            if old == wish { Need::Nothing } else { Need::Growth }
+            if old == wish {
+                Need::Nothing
+            } else {
+                Need::Growth
+            }
         }
         _ => Need::Tissue,
     }

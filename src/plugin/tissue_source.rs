@@ -10,7 +10,12 @@ use crate::plugin::{
     messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganError},
     organ_mesh::{MeshCopy, OrganMeshError, copy_mesh},
 };
-use crate::synthesis::{colonization::Growth, mesh::TriangleMesh, tissue::{Tissue, TissueSettings}, tree::System};
+use crate::synthesis::{
+    colonization::Growth,
+    mesh::TriangleMesh,
+    tissue::{Tissue, TissueSettings},
+    tree::System,
+};
 use bevy::{
     asset::{AssetEvent, AssetId, AssetServer, Assets, LoadState},
     ecs::{
