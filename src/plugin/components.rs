@@ -3,7 +3,7 @@
 //! An organ is an entity with a mesh and a [`Vasculature`]. Everything else is added by the plugin. Each system that has
 //! roots gets one vessel entity, a child of the organ, that carries a whole tree in [`Vessels`].
 
-use crate::plugin::{growth::GrowthState, segment_changes::SegmentChanges};
+use crate::plugin::{growth_state::GrowthState, segment_changes::SegmentChanges};
 use crate::synthesis::{
     colonization::ColonizationSettings,
     preset::{Preset, PresetName},

@@ -59,7 +59,7 @@ pub(crate) struct MeshCopy {
 /// What is missing or wrong, and how to repair it.
 pub fn read_mesh(mesh: &Mesh) -> Result<TriangleMesh, OrganMeshError> {
     let copy = copy_mesh(mesh)?;
-    Ok(TriangleMesh::new(copy.positions, copy.triangles)?)
+    Ok(TriangleMesh::new(copy.positions, copy.triangles, None)?)
 }
 
 /// Copies what [`read_mesh`] reads.

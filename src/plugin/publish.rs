@@ -3,7 +3,7 @@
 //! Only new and changed nodes are touched. A restart keeps the entities, so whatever else is on them stays.
 
 use crate::plugin::{
-    components::{OrganVessels, Vasculature, VesselAppearance, VesselSystem, VesselsOf},
+    components::{GrowthProgress, OrganVessels, Vasculature, VesselAppearance, VesselSystem, VesselsOf},
     growth_state::GrowthState,
     segment_changes::SegmentChanges,
     vessels::Vessels,
@@ -18,7 +18,7 @@ use bevy::{
         lifecycle::Remove,
         name::Name,
         observer::On,
-        query::{Changed, Or, QueryData},
+        query::{Changed, QueryData},
         system::{Commands, Query},
         world::EntityWorldMut,
     },
@@ -62,7 +62,7 @@ pub(crate) fn publish_vessels(
 
 /// Shows and hides systems as the organ's appearance says.
 pub(crate) fn show_systems(
-    organs: Query<(&VesselAppearance, &OrganVessels), Or<(Changed<VesselAppearance>, Changed<OrganVessels>)>>,
+    organs: Query<(&VesselAppearance, &OrganVessels), Changed<VesselAppearance>>,
     mut vessels: Query<(&VesselSystem, &mut Visibility)>,
 ) {
     for (appearance, entities) in &organs {
@@ -77,7 +77,7 @@ pub(crate) fn show_systems(
 pub(crate) fn remove_vessels(removed: On<Remove, Vasculature>, mut commands: Commands) {
     // Silenced, since the organ itself may have been despawned; the vessels follow it by their relationship then.
     commands.entity(removed.entity).queue_silenced(|mut organ: EntityWorldMut| {
-        organ.despawn_related::<OrganVessels>().remove::<GrowthState>();
+        organ.despawn_related::<OrganVessels>().remove::<(GrowthState, GrowthProgress)>();
     });
 }
 

@@ -96,7 +96,7 @@ pub(crate) fn begin(meshes: OrganMeshes, mut organs: Query<Organ>, mut messages:
 
 /// Starts the growth of organs whose tissue has become ready.
 pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessages) {
-    for mut organ in &mut organs {
+    for mut organ in organs.iter_mut().filter(|organ| organ.state.awaits_tissue()) {
         if let Some(prepared) = organ.state.poll_preparation() {
             let outcome = organ.start(Some(prepared));
             organ.report(outcome, &mut messages);
@@ -115,8 +115,13 @@ fn mesh_news(event: &AssetEvent<Mesh>) -> Option<(AssetId<Mesh>, bool)> {
 
 /// The slow part of the preparation, as a pure function of what was copied from the mesh.
 fn prepare(copy: MeshCopy, settings: &TissueSettings) -> Prepared {
-    let mesh = TriangleMesh::new(copy.positions, copy.triangles).map_err(OrganMeshError::from)?;
-    Ok(settings.build(mesh)?)
+    let mesh = TriangleMesh::new(copy.positions, copy.triangles, None).map_err(OrganMeshError::from)?;
+    Ok(match settings.mode {
+        crate::synthesis::tissue::TissueMode::Surface => Arc::new(crate::synthesis::tissue::MeshSurface::new(mesh)?),
+        crate::synthesis::tissue::TissueMode::Volume => {
+            Arc::new(crate::synthesis::tissue::MeshVolume::new(&mesh, 128)?)
+        }
+    })
 }
 
 impl OrganMeshes<'_> {
@@ -214,7 +219,7 @@ impl GrowthProgress {
             step: growth.map_or(0, Growth::steps_done),
             steps: growth.map_or(0, |growth| growth.settings().steps),
             nodes: of_systems(|growth, system| growth.tree(system).len()),
-            drains: of_systems(Growth::drains),
+            drains: of_systems(Growth::drains_left),
             grow_time,
         }
     }

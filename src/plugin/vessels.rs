@@ -5,11 +5,7 @@ use crate::synthesis::{
     colonization::Growth,
     tree::{NO_PARENT, NodeId, System, VesselTree},
 };
-use bevy::{
-    camera::primitives::Aabb,
-    ecs::component::Component,
-    math::{Vec3, Vec3A},
-};
+use bevy::{camera::primitives::Aabb, ecs::component::Component, math::Vec3};
 
 /// The vessels of one system of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
 /// off its surface where the settings say so.
@@ -25,6 +21,20 @@ pub struct Vessels {
 }
 
 impl Vessels {
+    /// Vessels that did not grow here, such as a network read from a file, to be drawn like others.
+    ///
+    /// Put them on an entity with a [`VesselSystem`](crate::plugin::VesselSystem) and
+    /// [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. Whoever replaces them later marks what
+    /// became different in the entity's [`SegmentChanges`]. Nodes beyond the end of `birth_steps` count as born in
+    /// step 0.
+    pub fn from_tree(tree: &VesselTree, birth_steps: &[u32]) -> Self {
+        let mut vessels = Self::default();
+        for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
+            vessels.push(position, tree.parents()[node], radius, birth_steps.get(node).copied().unwrap_or(0));
+        }
+        vessels
+    }
+
     /// The tree. While the organ grows, it only gets longer and thicker; a restart empties it.
     pub fn tree(&self) -> &VesselTree {
         &self.tree
@@ -82,8 +92,12 @@ impl Vessels {
 
     fn append(&mut self, growth: &Growth, system: System, node: usize) {
         let tree = growth.tree(system);
-        let (position, radius) = (growth.lifted_position(system, node), tree.radii()[node]);
-        let parent = tree.parents()[node];
+        let position = growth.lifted_position(system, NodeId(node as u32));
+        self.push(position, tree.parents()[node], tree.radii()[node], growth.birth_steps(system)[node]);
+    }
+
+    fn push(&mut self, position: Vec3, parent: u32, radius: f32, birth_step: u32) {
+        let node = self.tree.len();
         let sibling = match parent {
             NO_PARENT => {
                 self.tree.push_root(position, radius);
@@ -96,12 +110,12 @@ impl Vessels {
         };
         self.first_children.push(NO_PARENT);
         self.next_siblings.push(sibling);
-        self.birth_steps.push(growth.birth_steps(system)[node]);
+        self.birth_steps.push(birth_step);
         self.enclose(node);
     }
 
     fn update(&mut self, growth: &Growth, system: System, node: usize) {
-        self.tree.positions_mut()[node] = growth.lifted_position(system, node);
+        self.tree.positions_mut()[node] = growth.lifted_position(system, NodeId(node as u32));
         self.tree.radii_mut()[node] = growth.tree(system).radii()[node];
         self.enclose(node);
     }

@@ -3,7 +3,7 @@
 //! The `gltf` crate decodes the JSON; the container and the data behind it are read here, where every offset and count is
 //! checked, so that a damaged file is an error.
 
-use super::read_mesh::{Fault, ReadError, read_bytes};
+use super::read_mesh::{Fault, MeshReadError, read_bytes};
 use crate::synthesis::mesh::{MAX_TRIANGLES, TriangleMesh};
 use bevy_math::{Mat4, Quat, Vec2, Vec3};
 use gltf::json::{
@@ -25,8 +25,8 @@ const COMPRESSIONS: [&str; 3] = ["KHR_draco_mesh_compression", "EXT_meshopt_comp
 /// every part has one; buffers within the file, as data URIs, or in files beside it. Points and lines are passed over.
 ///
 /// # Errors
-/// [`ReadError`], which names the file and the cause.
-pub fn read_glb(path: &Path) -> Result<TriangleMesh, ReadError> {
+/// [`MeshReadError`], which names the file and the cause.
+pub fn read_glb(path: &Path) -> Result<TriangleMesh, MeshReadError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     read_bytes(path).and_then(|bytes| decode(&bytes, folder)).map_err(|fault| fault.in_file(path))
 }

@@ -9,7 +9,7 @@ use std::{
 
 /// Why a mesh could not be read from a file.
 #[derive(Debug, thiserror::Error)]
-pub enum ReadError {
+pub enum MeshReadError {
     /// The file, or one it refers to, cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Io {
@@ -58,12 +58,12 @@ impl Fault {
         Self::Content(cause.into())
     }
 
-    pub(super) fn in_file(self, path: &Path) -> ReadError {
+    pub(super) fn in_file(self, path: &Path) -> MeshReadError {
         let named = path.to_path_buf();
         match self {
-            Self::Io(path, source) => ReadError::Io { path, source },
-            Self::Content(cause) => ReadError::Content { path: named, cause },
-            Self::Mesh(source) => ReadError::Mesh { path: named, source },
+            Self::Io(path, source) => MeshReadError::Io { path, source },
+            Self::Content(cause) => MeshReadError::Content { path: named, cause },
+            Self::Mesh(source) => MeshReadError::Mesh { path: named, source },
         }
     }
 }
@@ -77,13 +77,13 @@ impl From<MeshError> for Fault {
 /// Reads the mesh in a `.glb`, `.gltf` or `.obj` file.
 ///
 /// # Errors
-/// [`ReadError`], which names the file and the cause.
-pub fn read_mesh(path: &Path) -> Result<TriangleMesh, ReadError> {
+/// [`MeshReadError`], which names the file and the cause.
+pub fn read_mesh(path: &Path) -> Result<TriangleMesh, MeshReadError> {
     let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
     match ending.as_deref().and_then(|ending| ending.to_str()) {
         Some("glb" | "gltf") => glb::read_glb(path),
-        Some("obj") => obj_mesh::read_obj(path),
-        _ => Err(ReadError::UnknownFormat { path: path.to_path_buf() }),
+        Some("obj") => obj_mesh::read_obj_mesh(path),
+        _ => Err(MeshReadError::UnknownFormat { path: path.to_path_buf() }),
     }
 }
 

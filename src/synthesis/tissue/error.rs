@@ -1,3 +1,4 @@
+use super::voxels::Grid;
 use crate::synthesis::mesh::{MAX_COORDINATE, MeshError};
 use bevy_math::Vec3;
 
@@ -27,7 +28,7 @@ pub enum TissueError {
     #[error("the resolution is 0; it must be at least 1 voxel along the longest side, 128 is usual")]
     NoResolution,
     /// More voxels than fit into memory.
-    #[error("a resolution of {resolution} takes {voxels} voxels, more than 67108864; lower it")]
+    #[error("a resolution of {resolution} takes {voxels} voxels, more than {}; lower it", Grid::MAX_VOXELS)]
     TooManyVoxels {
         /// Voxels along the longest side.
         resolution: u32,

@@ -49,9 +49,8 @@ impl MeshSurface {
     /// None for a [`TriangleMesh`], which is checked; the result type is that of every tissue.
     pub fn new(mesh: TriangleMesh) -> Result<Self, TissueError> {
         let bounds = mesh.bounds();
-        let topology = mesh.topology();
-        let facing = if topology.is_closed() && mesh.signed_volume() < 0.0 { -1.0 } else { 1.0 };
-        let mut normals = mesh.vertex_normals_with(topology.welding());
+        let facing = if mesh.signed_volume() < 0.0 && mesh.is_closed() { -1.0 } else { 1.0 };
+        let mut normals = mesh.vertex_normals();
         normals.iter_mut().for_each(|normal| *normal *= facing);
         let areas: Vec<f64> = (0..mesh.triangles().len())
             .map(|triangle| if mesh.is_degenerate(triangle) { 0.0 } else { mesh.triangle_area(triangle) })
