@@ -83,11 +83,16 @@ use bevy::app::{App, Plugin};
 pub struct VesselPlugin {
     /// How vessels grow in this app: schedule and budget.
     pub growth: plugin::GrowthPlugin,
+    /// How segments are drawn: how round they are.
+    #[cfg(feature = "render")]
+    pub segments: render::SegmentRenderPlugin,
 }
 
 #[cfg(feature = "plugin")]
 impl Plugin for VesselPlugin {
     fn build(&self, app: &mut App) {
         app.add_plugins(self.growth.clone());
+        #[cfg(feature = "render")]
+        app.add_plugins(self.segments.clone());
     }
 }

@@ -90,7 +90,7 @@ fn vessels_grow_on_the_surface_of_every_organ() {
             .collect();
         let tissue = Arc::new(MeshSurface::new(mesh).unwrap_or_else(|error| panic!("{name}: {error}")));
         let diameter = f64::from(tissue.extent().equivalent_diameter());
-        let growth = grow(&name, tissue, 40, 1000);
+        let growth = grow(&name, tissue, 100, 1000);
         let arterial = growth.tree(System::Arterial).len();
         assert!(arterial > 100, "{name}: only {arterial} arterial nodes grew");
         let every = nodes(&growth).count().div_ceil(60);
@@ -143,13 +143,11 @@ fn vessels_grow_inside_every_organ() {
         let growth = grow(&name, Arc::new(volume), 30, 3000);
         let arterial = growth.tree(System::Arterial).len();
         assert!(arterial > 100, "{name}: only {arterial} arterial nodes grew");
-        if OPEN.contains(&name.as_str()) {
-            continue;
-        }
         let positions: Vec<Vec3> = nodes(&growth).collect();
         let outside = windings(&mesh, &positions).into_iter().filter(|&winding| winding == 0).count();
         println!("{name}: {outside} of {} nodes outside", positions.len());
-        assert!(outside * 200 <= positions.len(), "{name}: {outside} of {} nodes are outside", positions.len());
+        let closed = !OPEN.contains(&name.as_str());
+        assert!(!closed || outside * 200 <= positions.len(), "{name}: {outside} of {} nodes outside", positions.len());
     }
 }
 

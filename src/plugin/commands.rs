@@ -1,7 +1,8 @@
 //! Growing an organ in one call, without waiting for frames.
 
 use crate::plugin::{
-    growth::{end_if_finished, run_to_end},
+    components::GrowthPhase,
+    growth::{is_done, run_to_end},
     growth_state::Need,
     messages::GrowthFinished,
     publish::publish_vessels,
@@ -74,7 +75,8 @@ fn finish_organ(
         organ.report(outcome, &mut messages);
     }
     run_to_end(&mut organ.state, &mut organ.progress);
-    if end_if_finished(&organ.state, &mut organ.progress) {
+    if organ.progress.phase == GrowthPhase::Growing && is_done(&organ.state) {
+        organ.progress.phase = GrowthPhase::Finished;
         finished.write(GrowthFinished { organ: entity });
     }
 }

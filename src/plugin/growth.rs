@@ -94,7 +94,8 @@ pub(crate) fn grow(
     );
     *frame = GrowthFrame { steps, time: start.elapsed() };
     for (organ, _, state, mut progress) in &mut organs {
-        if progress.phase == GrowthPhase::Growing && end_if_finished(&state, &mut progress) {
+        if progress.phase == GrowthPhase::Growing && is_done(&state) {
+            progress.phase = GrowthPhase::Finished;
             finished.write(GrowthFinished { organ });
         }
     }
@@ -110,7 +111,9 @@ fn step(state: &mut GrowthState, progress: &mut GrowthProgress) {
 
 /// Does all remaining steps of an organ that has its tissue, and says how many they were.
 pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
-    if state.growth().is_none() {
+    if state.growth().is_none() || is_done(state) {
+        // Without a tissue the wish stays; at the end there is nothing left to wish for.
+        state.finish &= !is_done(state);
         return 0;
     }
     let start = Instant::now();
@@ -121,13 +124,9 @@ pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress)
     progress.step - before
 }
 
-/// Ends a growth that has done all its steps, and says whether it has.
-pub(crate) fn end_if_finished(state: &GrowthState, progress: &mut GrowthProgress) -> bool {
-    let finished = state.growth().is_some_and(|growth| growth.is_finished());
-    if finished {
-        progress.phase = GrowthPhase::Finished;
-    }
-    finished
+/// Whether there is a growth, and it has done all its steps.
+pub(crate) fn is_done(state: &GrowthState) -> bool {
+    state.growth().is_some_and(|growth| growth.is_finished())
 }
 
 /// The order in which organs take turns: rising, from the one after the `last` that had one.
@@ -199,7 +198,7 @@ mod tests {
     /// Steps done for each of three organs that need 3, 100 and 100 steps, over frames of two steps.
     #[test]
     fn organs_take_turns_within_and_across_frames() {
-        let mut left = [3, 100, 100];
+        let mut left = [3_i32, 100, 100];
         let mut last = None;
         for frame in 1..=30 {
             let growing = (0..3).filter(|&organ| left[organ] > 0).collect();

@@ -87,6 +87,7 @@ impl GrowthState {
             }
             GrowthAction::Restart => {
                 self.granted = 0;
+                self.finish = false;
                 self.demand(Need::Growth);
             }
             GrowthAction::Finish => self.finish = true,
@@ -149,6 +150,11 @@ impl GrowthState {
     pub(crate) fn await_tissue(&mut self, preparation: Task<Prepared>) {
         self.preparation = Some(preparation);
         self.need = Need::Nothing;
+    }
+
+    /// Whether a tissue is being prepared.
+    pub(crate) fn awaits_tissue(&self) -> bool {
+        self.preparation.is_some()
     }
 
     /// The result of the preparation, once it is there.

@@ -18,7 +18,7 @@ use bevy::{
         lifecycle::Remove,
         name::Name,
         observer::On,
-        query::{Changed, Or, QueryData},
+        query::{Changed, QueryData},
         system::{Commands, Query},
         world::EntityWorldMut,
     },
@@ -62,7 +62,7 @@ pub(crate) fn publish_vessels(
 
 /// Shows and hides systems as the organ's appearance says.
 pub(crate) fn show_systems(
-    organs: Query<(&VesselAppearance, &OrganVessels), Or<(Changed<VesselAppearance>, Changed<OrganVessels>)>>,
+    organs: Query<(&VesselAppearance, &OrganVessels), Changed<VesselAppearance>>,
     mut vessels: Query<(&VesselSystem, &mut Visibility)>,
 ) {
     for (appearance, entities) in &organs {

@@ -96,7 +96,7 @@ pub(crate) fn begin(meshes: OrganMeshes, mut organs: Query<Organ>, mut messages:
 
 /// Starts the growth of organs whose tissue has become ready.
 pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessages) {
-    for mut organ in &mut organs {
+    for mut organ in organs.iter_mut().filter(|organ| organ.state.awaits_tissue()) {
         if let Some(prepared) = organ.state.poll_preparation() {
             let outcome = organ.start(Some(prepared));
             organ.report(outcome, &mut messages);

@@ -21,6 +21,20 @@ pub struct Vessels {
 }
 
 impl Vessels {
+    /// Vessels that did not grow here, such as a network read from a file, to be drawn like others.
+    ///
+    /// Put them on an entity with a [`VesselSystem`](crate::plugin::VesselSystem) and
+    /// [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. Whoever replaces them later marks what
+    /// became different in the entity's [`SegmentChanges`]. Nodes beyond the end of `birth_steps` count as born in
+    /// step 0.
+    pub fn from_tree(tree: &VesselTree, birth_steps: &[u32]) -> Self {
+        let mut vessels = Self::default();
+        for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
+            vessels.push(position, tree.parents()[node], radius, birth_steps.get(node).copied().unwrap_or(0));
+        }
+        vessels
+    }
+
     /// The tree. While the organ grows, it only gets longer and thicker; a restart empties it.
     pub fn tree(&self) -> &VesselTree {
         &self.tree
@@ -78,8 +92,12 @@ impl Vessels {
 
     fn append(&mut self, growth: &Growth, system: System, node: usize) {
         let tree = growth.tree(system);
-        let (position, radius) = (growth.lifted_position(system, NodeId(node as u32)), tree.radii()[node]);
-        let parent = tree.parents()[node];
+        let position = growth.lifted_position(system, NodeId(node as u32));
+        self.push(position, tree.parents()[node], tree.radii()[node], growth.birth_steps(system)[node]);
+    }
+
+    fn push(&mut self, position: Vec3, parent: u32, radius: f32, birth_step: u32) {
+        let node = self.tree.len();
         let sibling = match parent {
             NO_PARENT => {
                 self.tree.push_root(position, radius);
@@ -92,7 +110,7 @@ impl Vessels {
         };
         self.first_children.push(NO_PARENT);
         self.next_siblings.push(sibling);
-        self.birth_steps.push(growth.birth_steps(system)[node]);
+        self.birth_steps.push(birth_step);
         self.enclose(node);
     }
 

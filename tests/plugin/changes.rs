@@ -84,6 +84,25 @@ fn a_replaced_mesh_is_prepared_again() {
     assert_ne!(prepared, tissue(app.world(), organ));
 }
 
+/// Meshes and wishes that change while a tissue is being prepared: what comes out is that of the last.
+#[test]
+fn an_outdated_tissue_never_arrives() {
+    let wish = || quick().with_seed(5);
+    let mut app = headless(GrowthBudget::Steps(100));
+    let large = add_mesh(&mut app, Sphere::new(0.5).mesh().uv(256, 256));
+    let cube = add_mesh(&mut app, Cuboid::new(1.0, 0.5, 0.8));
+    let organ = app.world_mut().spawn((Mesh3d(large), quick())).id();
+    app.update();
+    assert_eq!(progress(app.world(), organ).phase, GrowthPhase::PreparingTissue);
+    app.world_mut().entity_mut(organ).insert(Mesh3d(cube.clone()));
+    app.update();
+    app.world_mut().entity_mut(organ).insert(wish());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    let other = app.world_mut().spawn((Mesh3d(cube), wish())).id();
+    run_to_phase(&mut app, other, GrowthPhase::Finished);
+    assert_eq!(trees(app.world(), organ), trees(app.world(), other));
+}
+
 #[test]
 fn a_mesh_asset_that_is_modified_is_prepared_again() {
     let mut app = headless(GrowthBudget::Steps(5));

@@ -64,6 +64,10 @@ fn grow_now_finishes_in_one_call() {
     let before = trees(app.world(), organ);
     (0..5).for_each(|_| app.update());
     assert_eq!(before, trees(app.world(), organ), "it stays finished");
+    app.world_mut().commands().entity(organ).grow_now();
+    send(&mut app, organ, GrowthAction::Finish);
+    (0..2).for_each(|_| app.update());
+    assert_eq!(before, trees(app.world(), organ), "there is nothing left to do");
     assert_eq!(drain::<GrowthFinished>(app.world(), &mut finished), []);
 }
 

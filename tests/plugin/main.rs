@@ -31,7 +31,7 @@ const STEPS: u32 = 30;
 fn headless(budget: GrowthBudget) -> App {
     let mut app = App::new();
     let growth = GrowthPlugin::default().with_budget(budget);
-    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, VesselPlugin { growth }));
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, VesselPlugin { growth, ..default() }));
     app.finish();
     app.cleanup();
     app
@@ -39,8 +39,8 @@ fn headless(budget: GrowthBudget) -> App {
 
 /// Vessels that grow quickly.
 fn quick() -> Vasculature {
-    let mut vasculature = Vasculature::new(PresetName::Paper)
-        .with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::Beside);
+    let mut vasculature =
+        Vasculature::new(PresetName::Paper).with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::Beside);
     vasculature.settings.steps = STEPS;
     vasculature.settings.samples = 500;
     vasculature
@@ -85,10 +85,7 @@ fn send(app: &mut App, organ: Entity, action: GrowthAction) {
 }
 
 /// Collects messages over frames.
-fn drain<M: Message>(world: &World, cursor: &mut MessageCursor<M>) -> Vec<M>
-where
-    M: Clone,
-{
+fn drain<M: Message + Clone>(world: &World, cursor: &mut MessageCursor<M>) -> Vec<M> {
     cursor.read(world.resource::<Messages<M>>()).cloned().collect()
 }
 
