@@ -155,6 +155,15 @@ impl MeshTopology {
         self.boundary_edges() == 0
     }
 
+    /// Whether every edge is run along as often one way as the other, so that every point is enclosed a whole number of
+    /// times, from whichever side one looks. `flip` says which triangles count as reversed.
+    pub fn is_balanced(&self, flip: impl Fn(usize) -> bool) -> bool {
+        self.fans().all(|fan| {
+            let forward = fan.iter().filter(|edge| edge.forward != flip(edge.triangle as usize)).count();
+            2 * forward == fan.len()
+        })
+    }
+
     /// Vertices − edges + triangles, over what non-degenerate triangles use: 2 for a ball, 0 for a torus.
     pub fn euler_characteristic(&self) -> i64 {
         let mut used = vec![false; self.welding.count()];
