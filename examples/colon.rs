@@ -19,7 +19,10 @@ mod common;
 use bevy::prelude::*;
 use bevy_vessels::{
     prelude::*,
-    synthesis::organ::{ColonSettings, OrganMesh, RootSites},
+    synthesis::{
+        organ::{ColonSettings, OrganMesh, RootSites},
+        tree::System,
+    },
 };
 use clap::{Parser, ValueEnum};
 use common::{

@@ -6,7 +6,7 @@ use super::{
     studio::{StatusLine, View},
 };
 use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, prelude::*};
-use bevy_vessels::prelude::*;
+use bevy_vessels::{prelude::*, synthesis::tree::System};
 
 /// What the keys of [`ControlsPlugin`] do.
 pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours\nI  inside, up and down travel";
