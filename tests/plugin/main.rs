@@ -2,6 +2,7 @@
 
 mod budget;
 mod changes;
+mod desktop;
 mod entities;
 mod errors;
 mod growth;
