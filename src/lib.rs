@@ -55,3 +55,44 @@ pub mod synthesis;
 pub mod plugin;
 #[cfg(feature = "render")]
 pub mod render;
+
+/// What most apps with vessels name: `use bevy_vessels::prelude::*`.
+#[cfg(feature = "plugin")]
+pub mod prelude {
+    pub use crate::VesselPlugin;
+    pub use crate::plugin::{
+        EntityCommandsExt, GrowthAction, GrowthBudget, GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished,
+        GrowthPhase, GrowthProgress, OrganVessels, SegmentColoring, Vasculature, VesselAppearance, VesselSystem,
+        Vessels,
+    };
+    pub use crate::synthesis::colonization::ColonizationSettings;
+    pub use crate::synthesis::preset::PresetName;
+    pub use crate::synthesis::roots::RootPlacement;
+    pub use crate::synthesis::tissue::{TissueMode, TissueSettings};
+    pub use crate::synthesis::tree::System;
+}
+
+#[cfg(feature = "plugin")]
+use bevy::app::{App, Plugin};
+
+/// Everything that an app with vessels needs: growth, and drawing where the app draws.
+///
+/// Add it after `DefaultPlugins`. In an app without a renderer vessels grow all the same.
+#[cfg(feature = "plugin")]
+#[derive(Clone, Debug, Default)]
+pub struct VesselPlugin {
+    /// How vessels grow in this app: schedule and budget.
+    pub growth: plugin::GrowthPlugin,
+    /// How segments are drawn: how round they are.
+    #[cfg(feature = "render")]
+    pub segments: render::SegmentRenderPlugin,
+}
+
+#[cfg(feature = "plugin")]
+impl Plugin for VesselPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins(self.growth.clone());
+        #[cfg(feature = "render")]
+        app.add_plugins(self.segments.clone());
+    }
+}

@@ -2,8 +2,8 @@
 
 use bevy_math::{Vec3, vec3};
 use bevy_vessels::synthesis::io::{
-    ObjOptions, ReadError, SwcOptions, SwcReadOptions, WriteError, read_swc, read_swc_file, write_atomically,
-    write_csv, write_obj, write_swc,
+    ObjOptions, ReadError, SwcOptions, SwcReadOptions, WriteError, load_swc, read_swc, save_csv, save_obj, save_swc,
+    write_atomically, write_csv, write_obj, write_swc,
 };
 use bevy_vessels::synthesis::rng::Stream;
 use bevy_vessels::synthesis::tree::{NO_PARENT, System, VesselTree};
@@ -170,7 +170,7 @@ fn swc_errors_name_the_line_and_the_value() {
     );
     let long = message(&format!("1 0 {} 0 0 1 -1", "x".repeat(100_000)));
     assert!(long.len() < 200, "a message of {} bytes", long.len());
-    let missing = read_swc_file("no/such/file.swc", &SwcReadOptions::default()).expect_err("no file").to_string();
+    let missing = load_swc("no/such/file.swc", &SwcReadOptions::default()).expect_err("no file").to_string();
     assert!(missing.contains("file.swc"), "{missing}");
 }
 
@@ -212,7 +212,7 @@ fn least_radius_lifts_what_is_too_thin() {
     }
 }
 
-/// Nodes, roots, leaves and total length of the vessels that are shared for tests, and N_k where they are trees.
+/// Nodes, roots, leaves and total length of the vessels that are shared for tests, and `N_k` where they are trees.
 #[test]
 fn real_vessels_come_back_and_have_the_published_statistics() {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/vessels"));
@@ -223,10 +223,10 @@ fn real_vessels_come_back_and_have_the_published_statistics() {
     let published: serde_json::Value = serde_json::from_str(&published).expect("JSON");
     for (name, expected) in published.as_object().expect("an object") {
         let path = folder.join(format!("{name}.swc"));
-        let strict = read_swc_file(&path, &SwcReadOptions::default());
+        let strict = load_swc(&path, &SwcReadOptions::default());
         let has_zero_radii = expected["radius_min"].as_f64() == Some(0.0);
         assert_eq!(strict.is_err(), has_zero_radii, "{name}");
-        let tree = read_swc_file(&path, &SwcReadOptions { least_radius: Some(1e-3) }).expect(name);
+        let tree = load_swc(&path, &SwcReadOptions { least_radius: Some(1e-3) }).expect(name);
         tree.validate().expect(name);
         assert_eq!(read(swc(&tree)).expect(name), tree, "{name}");
         let statistics = tree.statistics();
@@ -380,6 +380,22 @@ fn the_same_tree_gives_the_same_bytes() {
     assert_eq!(swc(&tree), swc(&tree.clone()));
     let trees = [(System::Arterial, &tree)];
     assert_eq!(obj(&trees, &ObjOptions::default()), obj(&trees, &ObjOptions::default()));
+}
+
+#[test]
+fn saved_files_hold_what_is_written() {
+    let folder = Folder::new("saved");
+    let (tree, options) = (random(2, 60), ObjOptions::default());
+    let trees = [(System::Venous, &tree)];
+    save_swc(folder.join("a.swc"), &tree, &SwcOptions::default()).expect("a file");
+    save_obj(folder.join("a.obj"), &trees, &options).expect("a file");
+    save_csv(folder.join("a.csv"), &trees).expect("a file");
+    assert_eq!(folder.names(), ["a.csv", "a.obj", "a.swc"]);
+    let content = |name| fs::read(folder.join(name)).expect("a file");
+    assert_eq!(content("a.swc"), swc(&tree));
+    assert_eq!(content("a.obj"), obj(&trees, &options));
+    assert!(content("a.csv").starts_with(b"system,id,"));
+    assert_eq!(load_swc(folder.join("a.swc"), &SwcReadOptions::default()).expect("a tree"), tree);
 }
 
 #[test]

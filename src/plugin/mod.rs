@@ -1,1 +1,142 @@
-//! ECS glue.
+//! ECS glue: vessels grow on organ entities, frame by frame. No drawing.
+//!
+//! In: an entity with a `Mesh3d` and a [`Vasculature`]. Out: a vessel entity per system, child of the organ, with the
+//! tree in [`Vessels`] and what changed in [`SegmentChanges`]; the state of things in [`GrowthProgress`] and messages.
+//!
+//! ```text
+//! Source      commands, wishes, mesh assets ─► tissue (in the task pool) ─► growth, started
+//! Grow        steps, one organ after the other, within the GrowthBudget
+//! Cut         (empty)
+//! Circulate   (empty)
+//! Publish     new and changed nodes ─► Vessels, SegmentChanges, Aabb; diagnostics
+//! ```
+
+mod commands;
+mod components;
+pub mod diagnostics;
+mod growth;
+mod growth_state;
+mod messages;
+mod organ_mesh;
+mod procedural;
+mod publish;
+mod segment_changes;
+mod tissue_source;
+mod vessels;
+
+pub use commands::EntityCommandsExt;
+pub use components::{
+    GrowthControl, GrowthPhase, GrowthProgress, OrganVessels, SegmentColoring, Vasculature, VesselAppearance,
+    VesselSystem, VesselsOf,
+};
+pub use growth::{GrowthBudget, GrowthFrame};
+pub use growth_state::GrowthState;
+pub use messages::{GrowthAction, GrowthCommand, GrowthFailed, GrowthFinished, GrowthStarted, OrganError};
+pub use organ_mesh::{OrganMeshError, read_mesh};
+pub use segment_changes::SegmentChanges;
+pub use vessels::Vessels;
+
+use bevy::{
+    app::{App, Plugin, Update},
+    asset::Assets,
+    ecs::{
+        intern::Interned,
+        schedule::{IntoScheduleConfigs, ScheduleLabel, SystemSet, common_conditions::resource_exists},
+    },
+    log::warn,
+    mesh::Mesh,
+};
+
+/// Grows vessels on every entity with a [`Vasculature`]. Needs no window and no renderer, only mesh assets:
+/// `DefaultPlugins`, or `AssetPlugin` and `MeshPlugin`.
+///
+/// [`VesselPlugin`](crate::VesselPlugin) adds this, and drawing.
+#[derive(Clone, Debug)]
+pub struct GrowthPlugin {
+    schedule: Interned<dyn ScheduleLabel>,
+    budget: GrowthBudget,
+}
+
+impl GrowthPlugin {
+    /// Runs in another schedule than `Update`.
+    #[must_use]
+    pub fn in_schedule(mut self, schedule: impl ScheduleLabel) -> Self {
+        self.schedule = schedule.intern();
+        self
+    }
+
+    /// Starts with another budget than [`GrowthBudget::default`]. It is a resource, and may be changed later.
+    #[must_use]
+    pub fn with_budget(mut self, budget: GrowthBudget) -> Self {
+        self.budget = budget;
+        self
+    }
+}
+
+impl Default for GrowthPlugin {
+    fn default() -> Self {
+        Self { schedule: Update.intern(), budget: GrowthBudget::default() }
+    }
+}
+
+impl Plugin for GrowthPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(self.budget)
+            .init_resource::<GrowthFrame>()
+            .add_message::<GrowthCommand>()
+            .add_message::<GrowthStarted>()
+            .add_message::<GrowthFinished>()
+            .add_message::<GrowthFailed>()
+            .add_observer(publish::remove_vessels);
+        diagnostics::register(app);
+        app.configure_sets(
+            self.schedule,
+            (
+                VesselSystems::Source.run_if(resource_exists::<Assets<Mesh>>),
+                VesselSystems::Grow,
+                VesselSystems::Cut,
+                VesselSystems::Circulate,
+                VesselSystems::Publish,
+            )
+                .chain(),
+        );
+        app.add_systems(
+            self.schedule,
+            (
+                (
+                    tissue_source::obey_commands,
+                    tissue_source::notice_changes,
+                    tissue_source::begin,
+                    tissue_source::receive_tissues,
+                )
+                    .chain()
+                    .in_set(VesselSystems::Source),
+                growth::grow.in_set(VesselSystems::Grow),
+                (publish::publish_vessels, publish::show_systems, diagnostics::measure)
+                    .chain()
+                    .in_set(VesselSystems::Publish),
+            ),
+        );
+    }
+
+    fn finish(&self, app: &mut App) {
+        if !app.world().contains_resource::<Assets<Mesh>>() {
+            warn!("no vessels will grow: there are no mesh assets; add DefaultPlugins, or AssetPlugin and MeshPlugin");
+        }
+    }
+}
+
+/// What happens to vessels in a frame, in this order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum VesselSystems {
+    /// Changed meshes and wishes become tissues; growths start.
+    Source,
+    /// Growths step.
+    Grow,
+    /// Vessels are cut, clamped and cauterised.
+    Cut,
+    /// Blood flows, and is lost.
+    Circulate,
+    /// Vessel entities are brought up to date.
+    Publish,
+}

@@ -26,7 +26,7 @@
 //! ```
 //! use bevy_vessels::synthesis::{
 //!     colonization::{ColonizationSettings, Growth},
-//!     io::swc,
+//!     io::{SwcOptions, save_swc},
 //!     roots::Roots,
 //!     tissue::{Disc, Tissue},
 //!     tree::System,
@@ -41,7 +41,7 @@
 //! let arteries = growth.vessels(System::Arterial);
 //! println!("{} nodes, {} tips", arteries.len(), arteries.tips().len());
 //! # let path = std::env::temp_dir().join("bevy_vessels_doctest.swc");
-//! swc::write_swc(&path, &arteries, &[])?;
+//! save_swc(&path, &arteries, &SwcOptions::default())?;
 //! # std::fs::remove_file(path)?;
 //! # Ok(())
 //! # }

@@ -1,10 +1,20 @@
 //! CSV of segments, for spreadsheets and data frames: a header, then one line per segment.
 
+use super::{WriteError, write_atomically};
 use crate::synthesis::tree::{System, VesselTree};
 use std::io::{self, Write};
+use std::path::Path;
 
 /// Names of the columns, in order.
 const HEADER: &str = "system,id,parent,x0,y0,z0,x1,y1,z1,r0,r1,length,strahler,level,branch";
+
+/// Writes the segments of one or more trees to a CSV file, whole or not at all. See [`write_csv`].
+///
+/// # Errors
+/// Those of [`write_atomically`].
+pub fn save_csv(path: impl AsRef<Path>, trees: &[(System, &VesselTree)]) -> Result<(), WriteError> {
+    write_atomically(path, |out| write_csv(out, trees))
+}
 
 /// Writes the segments of one or more trees as CSV (RFC 4180, with line feeds), in the order of the trees' nodes.
 ///

@@ -1,18 +1,22 @@
 //! Files: trees are written as SWC, OBJ and CSV, and read from SWC; organ meshes are read from GLB, glTF and OBJ with the
 //! feature `mesh_files`.
 //!
-//! Every format is a function that writes a tree to any [`std::io::Write`]. [`write_atomically`] puts its output in a
-//! file that is there whole or not at all:
+//! Every format has a function that writes to any [`std::io::Write`], such as [`write_swc`], and one that writes a file,
+//! such as [`save_swc`]. Files are there whole or not at all, by [`write_atomically`].
 //!
 //! ```
-//! use bevy_vessels::synthesis::{io, tree::VesselTree};
+//! use bevy_vessels::synthesis::{
+//!     io::{SwcOptions, SwcReadOptions, load_swc, save_swc},
+//!     tree::{NO_PARENT, VesselTree},
+//! };
+//! use bevy_math::Vec3;
 //!
-//! # fn main() -> Result<(), io::WriteError> {
-//! # let path = std::env::temp_dir().join(format!("bevy_vessels_doc_{}.swc", std::process::id()));
-//! # let path = path.as_path();
-//! let tree = VesselTree::new();
-//! io::write_atomically(path, |out| io::write_swc(out, &tree, &io::SwcOptions::default()))?;
-//! # std::fs::remove_file(path).ok();
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let path = std::env::temp_dir().join(format!("bevy_vessels_io_{}.swc", std::process::id()));
+//! let tree = VesselTree::from_arrays(vec![Vec3::ZERO, Vec3::X], vec![NO_PARENT, 0], vec![0.2, 0.1])?;
+//! save_swc(&path, &tree, &SwcOptions::default())?;
+//! assert_eq!(load_swc(&path, &SwcReadOptions::default())?, tree);
+//! # std::fs::remove_file(path)?;
 //! # Ok(())
 //! # }
 //! ```
@@ -33,13 +37,13 @@ mod swc;
 mod swc_read;
 
 pub use atomic::{WriteError, write_atomically};
-pub use csv::write_csv;
+pub use csv::{save_csv, write_csv};
 #[cfg(feature = "mesh_files")]
 pub use glb::read_glb;
-pub use obj::{ObjOptions, write_obj};
+pub use obj::{ObjOptions, save_obj, write_obj};
 #[cfg(feature = "mesh_files")]
 pub use obj_mesh::read_obj_mesh;
 #[cfg(feature = "mesh_files")]
 pub use read_mesh::{MeshReadError, read_mesh};
-pub use swc::{SwcOptions, write_swc};
-pub use swc_read::{ReadError, SwcReadOptions, read_swc, read_swc_file};
+pub use swc::{SwcOptions, save_swc, write_swc};
+pub use swc_read::{ReadError, SwcReadOptions, load_swc, read_swc};

@@ -4,14 +4,13 @@
 //! axis; the rings where the cone touches the spheres are shared, so normals are smooth all over. Tubes of neighbouring
 //! segments overlap at their common node, which hides the joint. One vessel is thus many closed pieces, not one surface.
 
+use super::{WriteError, write_atomically};
+use crate::synthesis::instances::MAX_FLARE;
 use crate::synthesis::tree::{System, VesselTree};
 use bevy_math::{Vec3, ops};
 use std::f32::consts::{PI, TAU};
 use std::io::{self, ErrorKind, Write};
-
-/// How a segment begins: with its parent's radius, but with no more than this multiple of its own, so that a thin side
-/// branch does not begin as a thorn as wide as its trunk.
-const MAX_FLARE: f32 = 1.3;
+use std::path::Path;
 
 /// How finely segments are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,9 +46,22 @@ impl Default for ObjOptions {
     }
 }
 
+/// Writes the segments of one or more trees to an OBJ file, whole or not at all. See [`write_obj`].
+///
+/// # Errors
+/// Those of [`write_atomically`], and more vertices than [`write_obj`] can number.
+pub fn save_obj(
+    path: impl AsRef<Path>,
+    trees: &[(System, &VesselTree)],
+    options: &ObjOptions,
+) -> Result<(), WriteError> {
+    write_atomically(path, |out| write_obj(out, trees, options))
+}
+
 /// Writes the segments of one or more trees as OBJ, one group (`g arterial`) per tree, in tissue lengths.
 ///
-/// Triangles are oriented outwards and every vertex has its normal. A segment within the sphere of one of its ends is
+/// A segment begins with its parent's radius, but with no more than [`MAX_FLARE`] times its own. Triangles are oriented
+/// outwards and every vertex has its normal. A segment within the sphere of one of its ends is
 /// drawn as that sphere.
 ///
 /// # Errors
@@ -127,7 +139,7 @@ impl Template {
 
     /// Angle between the axis and the normals on a ring, counted from 1 at the far pole.
     ///
-    /// The cone touches both spheres where its normal has the part (r_start − r_end) / length along the axis. Up to there
+    /// The cone touches both spheres where its normal has the part `(r_start − r_end) / length` along the axis. Up to there
     /// the rings lie on the far sphere, from there on the near one. Spheres alone have their rings spread evenly.
     fn colatitude(&self, ring: usize, length: f32, taper: f32) -> f32 {
         let rings = self.cap_rings as f32;

@@ -2,10 +2,12 @@
 //!
 //! Columns `id type x y z radius parent`, ids from 1, parent -1 for a root; lines that begin with `#` are comments.
 //! Source: Cannon, Turner, Pyapali & Wheal, "An on-line archive of reconstructed hippocampal neurons" (1998), and the
-//! SWCplus specification (neuroinformatics.nl/swcPlus). A file may have several roots.
+//! `SWCplus` specification (neuroinformatics.nl/swcPlus). A file may have several roots.
 
+use super::{WriteError, write_atomically};
 use crate::synthesis::tree::{NO_PARENT, VesselTree};
 use std::io::{self, Write};
+use std::path::Path;
 
 /// What an SWC file says beside the tree.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -18,6 +20,14 @@ pub struct SwcOptions {
     ///
     /// Default: 0.
     pub structure: u32,
+}
+
+/// Writes a tree to an SWC file, whole or not at all. See [`write_swc`].
+///
+/// # Errors
+/// Those of [`write_atomically`].
+pub fn save_swc(path: impl AsRef<Path>, tree: &VesselTree, options: &SwcOptions) -> Result<(), WriteError> {
+    write_atomically(path, |out| write_swc(out, tree, options))
 }
 
 /// Writes a tree as SWC, nodes in the tree's order, lengths as they are.

@@ -93,7 +93,7 @@ impl ReadError {
 ///
 /// # Errors
 /// Those of [`read_swc`], and a file that cannot be opened.
-pub fn read_swc_file(path: impl AsRef<Path>, options: &SwcReadOptions) -> Result<VesselTree, ReadError> {
+pub fn load_swc(path: impl AsRef<Path>, options: &SwcReadOptions) -> Result<VesselTree, ReadError> {
     let path = path.as_ref();
     let file = File::open(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
     read_swc(BufReader::new(file), options)

@@ -48,7 +48,7 @@ impl Summary {
 /// several vessels leave starts a stream for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StrahlerOrder {
-    /// Number N_k of streams.
+    /// Number `N_k` of streams.
     pub streams: usize,
     /// Mean length of a stream, in tissue lengths.
     pub mean_length: f64,
@@ -79,19 +79,19 @@ pub struct TreeStatistics {
     pub terminal_radius: Option<Summary>,
     /// Angles between the two daughter segments of each bifurcation, in degrees.
     pub bifurcation_angle: Option<Summary>,
-    /// Area ratios (r_1² + r_2²) / r_p² of each bifurcation.
+    /// Area ratios `(r_1² + r_2²) / r_p²` of each bifurcation.
     pub area_ratio: Option<Summary>,
-    /// Asymmetry ratios r_s / r_l of each bifurcation: smaller over larger daughter radius.
+    /// Asymmetry ratios `r_s / r_l` of each bifurcation: smaller over larger daughter radius.
     pub asymmetry: Option<Summary>,
     /// Tortuosity of the way to each leaf: its length along the vessels over the straight distance from the root.
     pub tortuosity: Option<Summary>,
     /// Streams by Strahler order, from order 1 on. Empty without segments.
     pub strahler: Vec<StrahlerOrder>,
-    /// Branching ratio R_B: 10 to the negative slope of log₁₀ N_k over k. Needs two orders.
+    /// Branching ratio `R_B`: 10 to the negative slope of log₁₀ `N_k` over k. Needs two orders.
     pub branching_ratio: Option<f64>,
-    /// Length ratio R_L: 10 to the slope of log₁₀ of the mean stream length over k. Needs two orders.
+    /// Length ratio `R_L`: 10 to the slope of log₁₀ of the mean stream length over k. Needs two orders.
     pub length_ratio: Option<f64>,
-    /// Diameter ratio R_D: 10 to the slope of log₁₀ of the mean stream diameter over k. Needs two orders.
+    /// Diameter ratio `R_D`: 10 to the slope of log₁₀ of the mean stream diameter over k. Needs two orders.
     pub diameter_ratio: Option<f64>,
     /// Mean diameter of the branches by the number of splits between them and their root, in tissue lengths. A branch
     /// counts once, with its mean diameter along its length.

@@ -78,10 +78,10 @@ impl VesselTree {
         Ok(())
     }
 
-    /// The largest relative error of Murray's law over all nodes with children: |r_p^κ − Σ r_c^κ| / r_p^κ, where p is
+    /// The largest relative error of Murray's law over all nodes with children: `|r_p^κ − Σ r_c^κ| / r_p^κ`, where p is
     /// the node, c its children and κ the `exponent`. 0 for a tree in which no node has children.
     ///
-    /// The terms are taken as (r_c / r_p)^κ, so that κ = 3 of a small radius does not underflow, and summed in f64.
+    /// The terms are taken as `(r_c / r_p)^κ`, so that κ = 3 of a small radius does not underflow, and summed in f64.
     ///
     /// Source: Murray, "The physiological principle of minimum work" (1926), in the general form of Rauch & Harders 2021,
     /// section 2.

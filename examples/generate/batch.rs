@@ -1,0 +1,92 @@
+//! Organs on threads, reported in the order of their seeds.
+
+use super::organ::Grower;
+use super::report::Line;
+use super::{Failure, Job};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc;
+
+/// Grows organs 0 to `organs` − 1, of the seeds that `seed_of` gives them, and hands each line to `report`, in order.
+///
+/// Up to `threads` threads work. The first failure in order ends the batch; the organs before it are reported.
+pub fn grow_all(
+    job: &Job,
+    organs: u64,
+    seed_of: impl Fn(u64) -> u64 + Sync,
+    threads: usize,
+    mut report: impl FnMut(&Line) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let bar = progress_bar(organs.saturating_mul(job.settings.steps.into()));
+    let workers = threads.min(usize::try_from(organs).unwrap_or(usize::MAX));
+    let next = AtomicU64::new(0);
+    let result = std::thread::scope(|scope| {
+        // Bounded, so that workers never run far ahead of a reader that is slow or has failed.
+        let (sender, receiver) = mpsc::sync_channel(workers);
+        for _ in 0..workers {
+            let (sender, next, seed_of, bar) = (sender.clone(), &next, &seed_of, &bar);
+            scope.spawn(move || {
+                with_threads(threads / workers, || {
+                    let mut grower = Grower::new(job);
+                    loop {
+                        let organ = next.fetch_add(1, Ordering::Relaxed);
+                        // Nobody listens any more once the batch has failed.
+                        if organ >= organs || sender.send((organ, grower.grow(seed_of(organ), || bar.inc(1)))).is_err()
+                        {
+                            break;
+                        }
+                    }
+                });
+            });
+        }
+        drop(sender);
+        let result = in_order(receiver.iter(), |line| bar.suspend(|| report(&line?)));
+        next.store(organs, Ordering::Relaxed);
+        result
+    });
+    bar.finish_and_clear();
+    result
+}
+
+/// Hands on what arrives under the numbers 0, 1, 2 … in any order, in the order of the numbers, until one fails.
+fn in_order<T>(
+    arriving: impl Iterator<Item = (u64, T)>,
+    mut hand_on: impl FnMut(T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut waiting = BTreeMap::new();
+    let mut due = 0;
+    for (number, item) in arriving {
+        waiting.insert(number, item);
+        while let Some(item) = waiting.remove(&due) {
+            hand_on(item)?;
+            due += 1;
+        }
+    }
+    Ok(())
+}
+
+/// Runs the work of one organ on so many threads.
+#[cfg(feature = "parallel")]
+fn with_threads(threads: usize, work: impl FnOnce() + Send) {
+    match rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build() {
+        Ok(pool) => pool.install(work),
+        // No more threads to be had: the organs come out the same on this one.
+        Err(_) => work(),
+    }
+}
+
+/// Runs the work of one organ on this thread, the only one that it can use.
+#[cfg(not(feature = "parallel"))]
+fn with_threads(_threads: usize, work: impl FnOnce()) {
+    work();
+}
+
+/// A bar on standard error, drawn only where that is a terminal.
+fn progress_bar(steps: u64) -> ProgressBar {
+    let bar = ProgressBar::new(steps);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} + {eta} left") {
+        bar.set_style(style);
+    }
+    bar
+}

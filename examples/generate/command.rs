@@ -1,0 +1,249 @@
+//! The command's options, and its way from them to grown organs.
+
+mod batch;
+mod edit;
+mod organ;
+mod report;
+
+use bevy_math::Vec3;
+use bevy_vessels::synthesis::{
+    colonization::ColonizationSettings,
+    io::{MeshReadError, read_mesh},
+    preset::{Preset, PresetName},
+    roots::RootPlacement,
+    tissue::{Ball, Cuboid, Disc, Tissue, TissueMode},
+};
+use clap::{Parser, ValueEnum};
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Grows arteries and veins in organs, without a window.
+#[derive(Debug, Parser)]
+#[command(name = "generate", version, args_override_self = true)]
+pub struct Options {
+    /// What to grow in: disc, ball or box, of diameter or edge 1 around the origin, or the mesh of an organ (GLB, glTF,
+    /// OBJ).
+    #[arg(long, default_value = "disc", value_name = "disc|ball|box|FILE")]
+    pub tissue: PathBuf,
+    /// Where on the mesh of an organ: over its surface, through its volume, or both in stages. Default: the preset's.
+    #[arg(long)]
+    pub mode: Option<Mode>,
+    /// Built-in settings, by name.
+    #[arg(long, default_value_t, conflicts_with = "settings", value_name = "NAME")]
+    pub preset: PresetName,
+    /// A preset of your own, as a RON file.
+    #[arg(long, value_name = "FILE.ron")]
+    pub settings: Option<PathBuf>,
+    /// Changes one value of the preset, such as `arterial.direction_weight=0.9`. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Number of growth steps. Default: the preset's.
+    #[arg(long)]
+    pub steps: Option<u32>,
+    /// Samples drawn from the tissue in each step. Default: the preset's.
+    #[arg(long)]
+    pub samples: Option<u32>,
+    /// Multiplies every length of the settings, after they were fitted to the tissue.
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    pub lengths: f32,
+    /// Grows arteries only.
+    #[arg(long)]
+    pub no_veins: bool,
+    /// Threads to work on; they share the organs, and what is left over the work within one. Default: all cores.
+    #[arg(long)]
+    pub threads: Option<NonZeroUsize>,
+    /// Seed of the first organ.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Number of organs, with seeds counting up.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    pub count: u64,
+    /// Part of the organs to grow, I of N from 0: those whose number divided by N leaves I.
+    #[arg(long, value_name = "I/N", default_value = "0/1", value_parser = parse_shard)]
+    pub shard: Shard,
+    /// Folder to write the vessels to; it is made if it is not there. Without it, nothing is written.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Formats to write.
+    #[arg(long, value_delimiter = ',', default_value = "swc")]
+    pub format: Vec<Format>,
+    /// Prints one line of JSON per organ.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A share of the organs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    index: u64,
+    of: u64,
+}
+
+fn parse_shard(text: &str) -> Result<Shard, String> {
+    let parts = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+    match parts {
+        Some((index, of)) if index < of => Ok(Shard { index, of }),
+        _ => Err("a shard is I/N with I from 0 to N − 1, such as 0/4".into()),
+    }
+}
+
+/// Where on the mesh of an organ vessels grow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Mode {
+    /// Over the surface.
+    Surface,
+    /// Through the volume.
+    Volume,
+    /// Over the surface first, then inward through the volume.
+    Staged,
+}
+
+impl Mode {
+    /// The tissue's mode. Stages that the preset has stay as they are; otherwise half of all steps go to the surface.
+    fn tissue_mode(self, preset: TissueMode, steps: u32) -> TissueMode {
+        match (self, preset) {
+            (Self::Surface, _) => TissueMode::Surface,
+            (Self::Volume, _) => TissueMode::Volume,
+            (Self::Staged, TissueMode::Staged { .. }) => preset,
+            (Self::Staged, _) => TissueMode::Staged { surface_steps: steps / 2 },
+        }
+    }
+}
+
+/// A format of files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Format {
+    /// Nodes and radii, a file per system.
+    Swc,
+    /// A surface to look at.
+    Obj,
+    /// A table of segments.
+    Csv,
+}
+
+/// Why the command stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// Options that cannot be meant.
+    #[error("{0}")]
+    Usage(String),
+    /// Something went wrong on the way.
+    #[error("{0}")]
+    Run(String),
+}
+
+impl Failure {
+    fn usage(cause: impl ToString) -> Self {
+        Self::Usage(cause.to_string())
+    }
+
+    fn run(cause: impl ToString) -> Self {
+        Self::Run(cause.to_string())
+    }
+
+    /// 2 for wrong usage, as clap has it, 1 for the rest.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::Run(_) => 1,
+        }
+    }
+}
+
+/// Everything that the organs of a batch have in common.
+struct Job {
+    tissue: Arc<dyn Tissue>,
+    settings: ColonizationSettings,
+    preset: Preset,
+    tissue_name: String,
+    preset_name: String,
+    out: Option<PathBuf>,
+    formats: Vec<Format>,
+}
+
+/// Grows the organs that the options ask for, and reports on `stdout` and in files.
+pub fn run(options: &Options, stdout: &mut impl Write) -> Result<(), Failure> {
+    if options.seed.checked_add(options.count - 1).is_none() {
+        return Err(Failure::usage("--seed plus --count is more than a seed can be, 2^64 − 1"));
+    }
+    let job = prepare(options)?;
+    let Shard { index, of } = options.shard;
+    let organs = options.count.saturating_sub(index).div_ceil(of);
+    let seed_of = |organ: u64| options.seed + index + organ * of;
+    let threads = options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
+    batch::grow_all(&job, organs, seed_of, threads, |line| {
+        let text = if options.json { line.json() } else { line.text() };
+        writeln!(stdout, "{text}").map_err(|error| Failure::run(format!("cannot write to standard output: {error}")))
+    })
+}
+
+fn prepare(options: &Options) -> Result<Job, Failure> {
+    let (mut preset, preset_name) = read_preset(options)?;
+    for change in &options.set {
+        preset = edit::apply(&preset, change).map_err(|error| Failure::Usage(format!("--set {change}: {error}")))?;
+    }
+    preset.settings.steps = options.steps.unwrap_or(preset.settings.steps);
+    preset.settings.samples = options.samples.unwrap_or(preset.settings.samples);
+    if options.no_veins {
+        preset.venous_roots = RootPlacement::None;
+    }
+    if !(options.lengths.is_finite() && options.lengths > 0.0) {
+        return Err(Failure::Usage(format!("--lengths is {}; it must be finite and above 0", options.lengths)));
+    }
+    let tissue = build_tissue(options, &mut preset)?;
+    let settings = preset.settings_for(tissue.extent()).scaled(options.lengths);
+    for warning in settings.validate().map_err(Failure::usage)? {
+        eprintln!("generate: warning: {warning}");
+    }
+    if let Some(folder) = &options.out {
+        let named = |error| Failure::Run(format!("cannot make the folder {}: {error}", folder.display()));
+        std::fs::create_dir_all(folder).map_err(named)?;
+    }
+    let mut formats = options.format.clone();
+    formats.sort();
+    formats.dedup();
+    let tissue_name = options.tissue.display().to_string();
+    Ok(Job { tissue, settings, preset, tissue_name, preset_name, out: options.out.clone(), formats })
+}
+
+fn read_preset(options: &Options) -> Result<(Preset, String), Failure> {
+    let Some(path) = &options.settings else {
+        return Ok((options.preset.load(), options.preset.name().to_owned()));
+    };
+    let named = |cause: &dyn std::fmt::Display| Failure::Run(format!("{}: {cause}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| named(&error))?;
+    let preset = Preset::from_ron(&text).map_err(|error| named(&error))?;
+    let stem = path.file_stem().unwrap_or(path.as_os_str());
+    Ok((preset, stem.to_string_lossy().into_owned()))
+}
+
+fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue>, Failure> {
+    let shape: Option<Arc<dyn Tissue>> = match options.tissue.to_str() {
+        Some("disc") => Some(Arc::new(Disc::flat(0.5).map_err(Failure::run)?)),
+        Some("ball") => Some(Arc::new(Ball::new(Vec3::ZERO, 0.5).map_err(Failure::run)?)),
+        Some("box") => Some(Arc::new(Cuboid::new(Vec3::ZERO, Vec3::ONE).map_err(Failure::run)?)),
+        _ => None,
+    };
+    match (shape, options.mode) {
+        (Some(_), Some(_)) => {
+            Err(Failure::usage("--mode is for the mesh of an organ; disc, ball and box are as they are"))
+        }
+        (Some(shape), None) => Ok(shape),
+        (None, mode) => {
+            if let Some(mode) = mode {
+                preset.tissue.mode = mode.tissue_mode(preset.tissue.mode, preset.settings.steps);
+            }
+            let mesh = read_mesh(&options.tissue).map_err(|error| match error {
+                MeshReadError::UnknownFormat { path } => Failure::Usage(format!(
+                    "--tissue is {}; it must be disc, ball, box, or a file that ends in .glb, .gltf or .obj",
+                    path.display()
+                )),
+                other => Failure::run(other),
+            })?;
+            let built = preset.tissue.build(&mesh);
+            built.map_err(|error| Failure::Run(format!("{}: {error}", options.tissue.display())))
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Diagnostics of the growth, for logs and overlays.
+
+use crate::plugin::{components::GrowthProgress, growth::GrowthFrame};
+use bevy::{
+    app::App,
+    diagnostic::{Diagnostic, DiagnosticPath, Diagnostics, RegisterDiagnostic},
+    ecs::{change_detection::Res, system::Query},
+};
+
+/// Steps done in a frame, over all organs.
+pub const STEPS: DiagnosticPath = DiagnosticPath::const_new("vessels/steps");
+/// Milliseconds that these steps took.
+pub const STEP_TIME: DiagnosticPath = DiagnosticPath::const_new("vessels/step_time");
+/// Nodes of all vessels.
+pub const NODES: DiagnosticPath = DiagnosticPath::const_new("vessels/nodes");
+/// Drains of all organs that wait for a vessel.
+pub const DRAINS: DiagnosticPath = DiagnosticPath::const_new("vessels/drains");
+
+/// Registers the diagnostics.
+pub(crate) fn register(app: &mut App) {
+    app.register_diagnostic(Diagnostic::new(STEPS))
+        .register_diagnostic(Diagnostic::new(STEP_TIME).with_suffix(" ms"))
+        .register_diagnostic(Diagnostic::new(NODES).with_smoothing_factor(0.0))
+        .register_diagnostic(Diagnostic::new(DRAINS).with_smoothing_factor(0.0));
+}
+
+/// Measures a frame.
+pub(crate) fn measure(mut diagnostics: Diagnostics, frame: Res<GrowthFrame>, organs: Query<&GrowthProgress>) {
+    let total = |count: fn(&GrowthProgress) -> [usize; 2]| organs.iter().flat_map(count).sum::<usize>() as f64;
+    diagnostics.add_measurement(&STEPS, || f64::from(frame.steps));
+    diagnostics.add_measurement(&STEP_TIME, || frame.time.as_secs_f64() * 1000.0);
+    diagnostics.add_measurement(&NODES, || total(|progress| progress.nodes));
+    diagnostics.add_measurement(&DRAINS, || total(|progress| progress.drains));
+}

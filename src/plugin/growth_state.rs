@@ -1,0 +1,309 @@
+//! What the plugin keeps about an organ while it grows: the tissue, the growth, and what is still to be done.
+
+use crate::plugin::{
+    components::{GrowthControl, Vasculature},
+    messages::{GrowthAction, OrganError},
+    organ_mesh::OrganMeshError,
+};
+use crate::synthesis::{
+    colonization::{Growth, SettingsWarning},
+    tissue::Tissue,
+    tree::System,
+};
+use bevy::{
+    asset::AssetId,
+    ecs::component::Component,
+    mesh::Mesh,
+    tasks::{Task, futures::check_ready},
+};
+use std::sync::Arc;
+
+/// A tissue, or why there is none.
+pub(crate) type Prepared = Result<Arc<dyn Tissue>, OrganError>;
+
+/// What must be done before an organ can grow on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Need {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// To start the growth again, on the same tissue.
+    Growth,
+    /// To prepare the tissue, then to start the growth.
+    Tissue,
+}
+
+/// The growth of an organ under way. For reading: the plugin drives it.
+#[derive(Component, Debug, Default)]
+pub struct GrowthState {
+    /// What must be done next.
+    pub(crate) need: Need,
+    /// The wishes and the mesh that the growth follows, or is about to.
+    followed: Option<(Vasculature, Option<AssetId<Mesh>>)>,
+    /// A tissue being prepared. Letting go of the task cancels it, so that no outdated tissue ever arrives.
+    preparation: Option<Task<Prepared>>,
+    tissue: Option<Arc<dyn Tissue>>,
+    growth: Option<Growth>,
+    error: Option<OrganError>,
+    /// Warnings that have been given for the settings.
+    warned: Vec<SettingsWarning>,
+    /// Steps that a paused growth may still do.
+    granted: u32,
+    /// Whether all remaining steps are to be done at once.
+    pub(crate) finish: bool,
+    /// Nodes whose radius changed since the vessels were last published.
+    changed: [Vec<u32>; 2],
+    /// Whether the vessels are to be published anew, from the first node on.
+    rebuild: bool,
+}
+
+impl GrowthState {
+    /// The growth: its trees are the centre lines on the tissue. `None` until the tissue is ready, and after an error.
+    pub fn growth(&self) -> Option<&Growth> {
+        self.growth.as_ref()
+    }
+
+    /// The tissue that is supplied. `None` until it is ready.
+    pub fn tissue(&self) -> Option<&dyn Tissue> {
+        self.tissue.as_deref()
+    }
+
+    /// Why the growth failed, if it did.
+    pub fn error(&self) -> Option<&OrganError> {
+        self.error.as_ref()
+    }
+
+    /// Does what a command says, and gives whether the growth goes on by itself from now on.
+    pub(crate) fn obey(&mut self, action: GrowthAction, control: GrowthControl) -> GrowthControl {
+        match action {
+            GrowthAction::Pause => {
+                self.granted = 0;
+                return GrowthControl::Paused;
+            }
+            GrowthAction::Resume => return GrowthControl::Running,
+            GrowthAction::Step(steps) => {
+                self.granted = self.granted.saturating_add(steps);
+                return GrowthControl::Paused;
+            }
+            GrowthAction::Restart => {
+                self.granted = 0;
+                self.finish = false;
+                self.demand(Need::Growth);
+            }
+            GrowthAction::Finish => self.finish = true,
+        }
+        control
+    }
+
+    /// Compares what is wished for with what the growth follows, and demands what the difference needs.
+    pub(crate) fn follow(&mut self, vasculature: &Vasculature, mesh: Option<AssetId<Mesh>>) {
+        let need = difference(self.followed.as_ref(), vasculature, mesh);
+        if need != Need::Nothing {
+            self.followed = Some((vasculature.clone(), mesh));
+            self.demand(need);
+        }
+    }
+
+    /// Whether the growth follows another mesh asset than this one.
+    pub(crate) fn follows_other_mesh(&self, mesh: Option<AssetId<Mesh>>) -> bool {
+        self.followed.as_ref().is_none_or(|(_, followed)| *followed != mesh)
+    }
+
+    /// Takes note that a mesh asset has new content (`replaced`), or has been loaded at last.
+    pub(crate) fn notice_mesh(&mut self, mesh: AssetId<Mesh>, replaced: bool) {
+        let was_missing = matches!(self.error, Some(OrganError::Mesh(OrganMeshError::NotLoaded { .. })));
+        if (replaced || was_missing) && !self.follows_other_mesh(Some(mesh)) {
+            self.demand(Need::Tissue);
+        }
+    }
+
+    fn demand(&mut self, need: Need) {
+        self.need = self.need.max(need);
+    }
+
+    /// Wants all steps done as soon as can be, and no preparation under way: what it prepares is needed now.
+    pub(crate) fn hasten(&mut self) {
+        self.finish = true;
+        if self.preparation.take().is_some() {
+            self.demand(Need::Tissue);
+        }
+    }
+
+    /// What there is to do now. A growth without a tissue needs one first, unless it is on its way.
+    pub(crate) fn next_need(&self) -> Need {
+        match self.need {
+            Need::Growth if self.tissue.is_none() && self.preparation.is_some() => Need::Nothing,
+            Need::Growth if self.tissue.is_none() => Need::Tissue,
+            need => need,
+        }
+    }
+
+    /// Lets go of tissue and growth, and of a preparation under way, because they no longer belong to the organ.
+    pub(crate) fn drop_tissue(&mut self) {
+        self.preparation = None;
+        self.tissue = None;
+        self.error = None;
+        self.rebuild |= self.growth.take().is_some();
+    }
+
+    /// Waits for a tissue from now on.
+    pub(crate) fn await_tissue(&mut self, preparation: Task<Prepared>) {
+        self.preparation = Some(preparation);
+        self.need = Need::Nothing;
+    }
+
+    /// Whether a tissue is being prepared.
+    pub(crate) fn awaits_tissue(&self) -> bool {
+        self.preparation.is_some()
+    }
+
+    /// The result of the preparation, once it is there.
+    pub(crate) fn poll_preparation(&mut self) -> Option<Prepared> {
+        let result = check_ready(self.preparation.as_mut()?)?;
+        self.preparation = None;
+        Some(result)
+    }
+
+    /// Starts the growth on a new tissue, or on the one at hand, where its buffers are used again.
+    ///
+    /// Gives the warnings about the settings that have not been given before.
+    pub(crate) fn start(
+        &mut self,
+        new_tissue: Option<Arc<dyn Tissue>>,
+        wish: &Vasculature,
+    ) -> Result<Vec<SettingsWarning>, OrganError> {
+        if let Some(tissue) = new_tissue {
+            self.growth = None;
+            self.tissue = Some(tissue);
+        }
+        self.need = Need::Nothing;
+        self.error = None;
+        self.rebuild = true;
+        let Some(tissue) = self.tissue.clone() else { return Ok(Vec::new()) };
+        let mut settings = wish.settings.clone();
+        if wish.fit {
+            settings = settings.fit(tissue.extent());
+        }
+        let growth = match self.growth.take() {
+            Some(mut growth) => growth.restart(settings, &wish.roots(), wish.seed).map(|()| growth),
+            None => Growth::new(tissue, settings, &wish.roots(), wish.seed),
+        }?;
+        let warnings = growth.settings().validate().unwrap_or_default();
+        self.growth = Some(growth);
+        Ok(self.unheard(warnings))
+    }
+
+    fn unheard(&mut self, warnings: Vec<SettingsWarning>) -> Vec<SettingsWarning> {
+        let unheard = warnings.iter().filter(|warning| !self.warned.contains(warning)).cloned().collect();
+        self.warned = warnings;
+        unheard
+    }
+
+    /// Ends what is under way because of an error. Vessels of an earlier growth go, too: they are not what is wished for.
+    pub(crate) fn fail(&mut self, error: OrganError) {
+        self.need = Need::Nothing;
+        self.preparation = None;
+        self.growth = None;
+        self.rebuild = true;
+        self.finish = false;
+        self.error = Some(error);
+    }
+
+    /// Whether a step may be done now.
+    pub(crate) fn may_step(&self, control: GrowthControl) -> bool {
+        let willing = control == GrowthControl::Running || self.granted > 0 || self.finish;
+        willing && self.growth.as_ref().is_some_and(|growth| !growth.is_finished())
+    }
+
+    /// Does one step and remembers what it changed. Without a growth, or at its end, nothing is done.
+    pub(crate) fn step(&mut self) {
+        let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { return };
+        growth.step();
+        self.granted = self.granted.saturating_sub(1);
+        for system in System::ALL {
+            self.changed[system.index()].extend_from_slice(growth.changed_radii(system));
+        }
+    }
+
+    /// Does all remaining steps.
+    pub(crate) fn run(&mut self) {
+        // With so many steps, taking everything anew is cheaper than to remember every change.
+        self.rebuild = true;
+        self.finish = false;
+        if let Some(growth) = self.growth.as_mut() {
+            growth.run();
+        }
+    }
+
+    /// Whether there is something to publish.
+    pub(crate) fn has_news(&self) -> bool {
+        self.rebuild || self.changed.iter().any(|changed| !changed.is_empty())
+    }
+
+    /// What is to be published of a system: the growth and the nodes that changed, `None` for all of them.
+    pub(crate) fn news(&self, system: System) -> (Option<&Growth>, Option<&[u32]>) {
+        let changed = (!self.rebuild).then_some(self.changed[system.index()].as_slice());
+        (self.growth.as_ref(), changed)
+    }
+
+    /// Forgets what has been published.
+    pub(crate) fn clear_news(&mut self) {
+        self.rebuild = false;
+        self.changed.iter_mut().for_each(Vec::clear);
+    }
+}
+
+/// What the difference between the followed wishes and the present ones needs.
+fn difference(
+    followed: Option<&(Vasculature, Option<AssetId<Mesh>>)>,
+    wish: &Vasculature,
+    mesh: Option<AssetId<Mesh>>,
+) -> Need {
+    match followed {
+        Some((old, old_mesh)) if old.tissue == wish.tissue && *old_mesh == mesh => {
+            if old == wish {
+                Need::Nothing
+            } else {
+                Need::Growth
+            }
+        }
+        _ => Need::Tissue,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_mesh_and_tissue_need_a_new_tissue() {
+        let old = Vasculature::default();
+        let mesh = Some(AssetId::default());
+        let followed = (old.clone(), mesh);
+        assert_eq!(difference(None, &old, mesh), Need::Tissue);
+        assert_eq!(difference(Some(&followed), &old, mesh), Need::Nothing);
+        assert_eq!(difference(Some(&followed), &old, None), Need::Tissue);
+        assert_eq!(difference(Some(&followed), &old.clone().with_seed(1), mesh), Need::Growth);
+        let unfitted = Vasculature { fit: false, ..old };
+        assert_eq!(difference(Some(&followed), &unfitted, mesh), Need::Growth);
+    }
+
+    #[test]
+    fn a_restart_without_tissue_prepares_it() {
+        let mut state = GrowthState::default();
+        state.obey(GrowthAction::Restart, GrowthControl::Running);
+        assert_eq!(state.next_need(), Need::Tissue);
+    }
+
+    #[test]
+    fn commands_grant_steps_to_a_paused_growth() {
+        let mut state = GrowthState::default();
+        assert_eq!(state.obey(GrowthAction::Step(2), GrowthControl::Running), GrowthControl::Paused);
+        assert_eq!(state.granted, 2);
+        assert_eq!(state.obey(GrowthAction::Pause, GrowthControl::Paused), GrowthControl::Paused);
+        assert_eq!(state.granted, 0);
+        assert_eq!(state.obey(GrowthAction::Resume, GrowthControl::Paused), GrowthControl::Running);
+        assert_eq!(state.obey(GrowthAction::Finish, GrowthControl::Paused), GrowthControl::Paused);
+        assert!(state.finish);
+    }
+}

@@ -1,0 +1,226 @@
+//! Source: from an organ's mesh and wishes to a growth that can step.
+//!
+//! Each frame: commands are obeyed, then wishes and meshes are compared with what the growth follows, then what the
+//! difference needs is done. A new tissue is prepared in the task pool, a growth on the same tissue starts at once and
+//! uses its buffers again.
+
+use crate::plugin::{
+    components::{GrowthControl, GrowthPhase, GrowthProgress, Vasculature},
+    growth_state::{GrowthState, Need, Prepared},
+    messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganError},
+    organ_mesh::{MeshCopy, OrganMeshError, copy_mesh},
+};
+use crate::synthesis::{
+    colonization::Growth,
+    mesh::TriangleMesh,
+    tissue::{Tissue, TissueSettings},
+    tree::System,
+};
+use bevy::{
+    asset::{AssetEvent, AssetId, AssetServer, Assets, LoadState},
+    ecs::{
+        change_detection::{DetectChanges, DetectChangesMut, Ref, Res},
+        entity::Entity,
+        message::{MessageReader, MessageWriter},
+        query::QueryData,
+        system::{Query, SystemParam},
+    },
+    log::warn,
+    mesh::{Mesh, Mesh3d},
+    tasks::{AsyncComputeTaskPool, TaskPool},
+};
+use std::{sync::Arc, time::Duration};
+
+/// An organ, with all that its source touches.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct Organ {
+    pub(crate) entity: Entity,
+    pub(crate) wish: Ref<'static, Vasculature>,
+    pub(crate) mesh: Option<&'static Mesh3d>,
+    pub(crate) state: &'static mut GrowthState,
+    pub(crate) progress: &'static mut GrowthProgress,
+}
+
+/// Where meshes come from.
+#[derive(SystemParam)]
+pub(crate) struct OrganMeshes<'w> {
+    meshes: Res<'w, Assets<Mesh>>,
+    server: Option<Res<'w, AssetServer>>,
+}
+
+/// Where a growth reports how it starts.
+#[derive(SystemParam)]
+pub(crate) struct StartMessages<'w> {
+    started: MessageWriter<'w, GrowthStarted>,
+    failed: MessageWriter<'w, GrowthFailed>,
+}
+
+/// Does what the commands of this frame say.
+pub(crate) fn obey_commands(
+    mut commands: MessageReader<GrowthCommand>,
+    mut organs: Query<(&mut GrowthControl, &mut GrowthState)>,
+) {
+    for command in commands.read() {
+        if let Ok((mut control, mut state)) = organs.get_mut(command.organ) {
+            let obeyed = state.obey(command.action, *control);
+            control.set_if_neq(obeyed);
+        }
+    }
+}
+
+/// Compares wishes and meshes with what each growth follows.
+pub(crate) fn notice_changes(mut meshes: MessageReader<AssetEvent<Mesh>>, mut organs: Query<Organ>) {
+    let news: Vec<_> = meshes.read().filter_map(mesh_news).collect();
+    for mut organ in &mut organs {
+        organ.follow();
+        for &(mesh, replaced) in &news {
+            if organ.mesh.is_some_and(|organ_mesh| organ_mesh.id() == mesh) {
+                organ.state.notice_mesh(mesh, replaced);
+            }
+        }
+    }
+}
+
+/// Begins what is needed: a tissue's preparation in the task pool, or a growth on the tissue at hand.
+pub(crate) fn begin(meshes: OrganMeshes, mut organs: Query<Organ>, mut messages: StartMessages) {
+    for mut organ in organs.iter_mut().filter(|organ| organ.state.need != Need::Nothing) {
+        let outcome = organ.begin(&meshes, |state, prepare| {
+            let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
+            state.await_tissue(pool.spawn(async move { prepare() }));
+            None
+        });
+        organ.report(outcome, &mut messages);
+    }
+}
+
+/// Starts the growth of organs whose tissue has become ready.
+pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessages) {
+    for mut organ in organs.iter_mut().filter(|organ| organ.state.awaits_tissue()) {
+        if let Some(prepared) = organ.state.poll_preparation() {
+            let outcome = organ.start(Some(prepared));
+            organ.report(outcome, &mut messages);
+        }
+    }
+}
+
+/// A mesh asset with new content (`true`), or one that has just come (`false`).
+fn mesh_news(event: &AssetEvent<Mesh>) -> Option<(AssetId<Mesh>, bool)> {
+    match *event {
+        AssetEvent::Modified { id } => Some((id, true)),
+        AssetEvent::Added { id } => Some((id, false)),
+        _ => None,
+    }
+}
+
+/// The slow part of the preparation, as a pure function of what was copied from the mesh.
+fn prepare(copy: MeshCopy, settings: &TissueSettings) -> Prepared {
+    let mesh = TriangleMesh::new(copy.positions, copy.triangles, None).map_err(OrganMeshError::from)?;
+    Ok(match settings.mode {
+        crate::synthesis::tissue::TissueMode::Surface => Arc::new(crate::synthesis::tissue::MeshSurface::new(mesh)?),
+        crate::synthesis::tissue::TissueMode::Volume => {
+            Arc::new(crate::synthesis::tissue::MeshVolume::new(&mesh, 128)?)
+        }
+    })
+}
+
+impl OrganMeshes<'_> {
+    /// A copy of an organ's mesh, `None` while it is on its way.
+    fn copy(&self, mesh: Option<&Mesh3d>) -> Result<Option<MeshCopy>, OrganMeshError> {
+        let Some(mesh) = mesh else { return Ok(None) };
+        if let Some(mesh) = self.meshes.get(mesh.id()) {
+            return copy_mesh(mesh).map(Some);
+        }
+        match self.server.as_ref().map(|server| server.load_state(mesh.id())) {
+            Some(LoadState::Failed(error)) => Err(OrganMeshError::NotLoaded { reason: error.to_string() }),
+            _ => Ok(None),
+        }
+    }
+}
+
+/// Whether a growth has started.
+type Started = bool;
+
+impl OrganItem<'_, '_> {
+    /// Takes note of changed wishes.
+    pub(crate) fn follow(&mut self) {
+        let mesh = self.mesh.map(|mesh| mesh.id());
+        if self.wish.is_changed() || self.state.follows_other_mesh(mesh) {
+            self.state.follow(&self.wish, mesh);
+        }
+    }
+
+    /// Does what is needed next. A slow preparation is handed to `run`, which may give its result at once.
+    pub(crate) fn begin(
+        &mut self,
+        meshes: &OrganMeshes,
+        run: impl FnOnce(&mut GrowthState, Box<dyn FnOnce() -> Prepared + Send>) -> Option<Prepared>,
+    ) -> Result<Started, OrganError> {
+        match self.state.next_need() {
+            Need::Nothing => Ok(false),
+            Need::Growth => self.start(None),
+            Need::Tissue => {
+                self.state.drop_tissue();
+                let Some(copy) = meshes.copy(self.mesh)? else {
+                    self.enter(GrowthPhase::WaitingForMesh);
+                    return Ok(false);
+                };
+                self.enter(GrowthPhase::PreparingTissue);
+                let settings = self.wish.tissue.clone();
+                match run(&mut self.state, Box::new(move || prepare(copy, &settings))) {
+                    Some(prepared) => self.start(Some(prepared)),
+                    None => Ok(false),
+                }
+            }
+        }
+    }
+
+    /// Starts the growth, on a tissue that has just been prepared or on the one at hand.
+    pub(crate) fn start(&mut self, prepared: Option<Prepared>) -> Result<Started, OrganError> {
+        let tissue: Option<Arc<dyn Tissue>> = prepared.transpose()?;
+        for warning in self.state.start(tissue, &self.wish)? {
+            warn!("{}: {warning}", self.entity);
+        }
+        self.enter(GrowthPhase::Growing);
+        Ok(true)
+    }
+
+    /// Says that the growth has started, or why it hasn't.
+    pub(crate) fn report(&mut self, outcome: Result<Started, OrganError>, messages: &mut StartMessages) {
+        let organ = self.entity;
+        match outcome {
+            Ok(true) => {
+                messages.started.write(GrowthStarted { organ });
+            }
+            Ok(false) => {}
+            Err(error) => {
+                warn!("{organ}: no vessels grow here: {error}");
+                self.state.fail(error.clone());
+                self.enter(GrowthPhase::Failed);
+                messages.failed.write(GrowthFailed { organ, error });
+            }
+        }
+    }
+
+    fn enter(&mut self, phase: GrowthPhase) {
+        let progress = GrowthProgress::of(phase, self.state.growth(), Duration::ZERO);
+        self.progress.set_if_neq(progress);
+    }
+}
+
+impl GrowthProgress {
+    /// The progress of a growth in a phase.
+    pub(crate) fn of(phase: GrowthPhase, growth: Option<&Growth>, grow_time: Duration) -> Self {
+        let of_systems = |count: fn(&Growth, System) -> usize| {
+            System::ALL.map(|system| growth.map_or(0, |growth| count(growth, system)))
+        };
+        Self {
+            phase,
+            step: growth.map_or(0, Growth::steps_done),
+            steps: growth.map_or(0, |growth| growth.settings().steps),
+            nodes: of_systems(|growth, system| growth.tree(system).len()),
+            drains: of_systems(Growth::drains_left),
+            grow_time,
+        }
+    }
+}

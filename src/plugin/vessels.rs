@@ -1,0 +1,133 @@
+//! The tree of a vessel entity, kept up to date with a growth at the cost of what changed.
+
+use crate::plugin::segment_changes::SegmentChanges;
+use crate::synthesis::{
+    colonization::Growth,
+    tree::{NO_PARENT, NodeId, System, VesselTree},
+};
+use bevy::{camera::primitives::Aabb, ecs::component::Component, math::Vec3};
+
+/// The vessels of one system of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
+/// off its surface where the settings say so.
+#[derive(Component, Clone, Debug, Default, PartialEq)]
+pub struct Vessels {
+    tree: VesselTree,
+    birth_steps: Vec<u32>,
+    /// First child of every node, [`NO_PARENT`] for none.
+    first_children: Vec<u32>,
+    /// Next child of the same parent, [`NO_PARENT`] for the last.
+    next_siblings: Vec<u32>,
+    bounds: Option<(Vec3, Vec3)>,
+}
+
+impl Vessels {
+    /// Vessels that did not grow here, such as a network read from a file, to be drawn like others.
+    ///
+    /// Put them on an entity with a [`VesselSystem`](crate::plugin::VesselSystem) and
+    /// [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. Whoever replaces them later marks what
+    /// became different in the entity's [`SegmentChanges`]. Nodes beyond the end of `birth_steps` count as born in
+    /// step 0.
+    pub fn from_tree(tree: &VesselTree, birth_steps: &[u32]) -> Self {
+        let mut vessels = Self::default();
+        for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
+            vessels.push(position, tree.parents()[node], radius, birth_steps.get(node).copied().unwrap_or(0));
+        }
+        vessels
+    }
+
+    /// The tree. While the organ grows, it only gets longer and thicker; a restart empties it.
+    pub fn tree(&self) -> &VesselTree {
+        &self.tree
+    }
+
+    /// The step in which each node was born, 0 for roots.
+    pub fn birth_steps(&self) -> &[u32] {
+        &self.birth_steps
+    }
+
+    /// A box that holds every segment, radii included; of no size where there is none.
+    ///
+    /// While vessels grow it only becomes larger.
+    pub fn aabb(&self) -> Aabb {
+        self.bounds.map_or_else(Aabb::default, |(min, max)| Aabb::from_min_max(min, max))
+    }
+
+    /// Takes over what the growth changed: `changed` nodes and all new ones, or everything where that is `None`.
+    ///
+    /// Without a growth nothing is left. All segments that are other than before are marked in `changes`.
+    pub(crate) fn follow(
+        &mut self,
+        growth: Option<&Growth>,
+        system: System,
+        changed: Option<&[u32]>,
+        changes: &mut SegmentChanges,
+    ) {
+        if changed.is_none() {
+            self.clear();
+            changes.mark_all();
+        }
+        let Some(growth) = growth else { return };
+        let known = self.tree.len();
+        for node in known..growth.tree(system).len() {
+            self.append(growth, system, node);
+            changes.mark_node(node);
+        }
+        for &node in changed.unwrap_or_default() {
+            let node = node as usize;
+            if node < known {
+                self.update(growth, system, node);
+                changes.mark_node(node);
+                self.children(node).for_each(|child| changes.mark_node(child));
+            }
+        }
+    }
+
+    fn clear(&mut self) {
+        self.tree.clear();
+        self.birth_steps.clear();
+        self.first_children.clear();
+        self.next_siblings.clear();
+        self.bounds = None;
+    }
+
+    fn append(&mut self, growth: &Growth, system: System, node: usize) {
+        let tree = growth.tree(system);
+        let position = growth.lifted_position(system, NodeId(node as u32));
+        self.push(position, tree.parents()[node], tree.radii()[node], growth.birth_steps(system)[node]);
+    }
+
+    fn push(&mut self, position: Vec3, parent: u32, radius: f32, birth_step: u32) {
+        let node = self.tree.len();
+        let sibling = match parent {
+            NO_PARENT => {
+                self.tree.push_root(position, radius);
+                NO_PARENT
+            }
+            parent => {
+                self.tree.push_child(NodeId(parent), position, radius);
+                std::mem::replace(&mut self.first_children[parent as usize], node as u32)
+            }
+        };
+        self.first_children.push(NO_PARENT);
+        self.next_siblings.push(sibling);
+        self.birth_steps.push(birth_step);
+        self.enclose(node);
+    }
+
+    fn update(&mut self, growth: &Growth, system: System, node: usize) {
+        self.tree.positions_mut()[node] = growth.lifted_position(system, NodeId(node as u32));
+        self.tree.radii_mut()[node] = growth.tree(system).radii()[node];
+        self.enclose(node);
+    }
+
+    fn enclose(&mut self, node: usize) {
+        let (position, radius) = (self.tree.positions()[node], self.tree.radii()[node]);
+        let (min, max) = self.bounds.unwrap_or((position, position));
+        self.bounds = Some((min.min(position - radius), max.max(position + radius)));
+    }
+
+    fn children(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+        let link = |child: u32| (child != NO_PARENT).then_some(child as usize);
+        std::iter::successors(link(self.first_children[node]), move |&child| link(self.next_siblings[child]))
+    }
+}

@@ -1,0 +1,106 @@
+//! What segments are made of: Bevy's standard material, with a vertex stage that pulls segments from a buffer.
+
+use crate::synthesis::tree::System;
+use bevy::{
+    asset::embedded_path,
+    mesh::MeshVertexBufferLayoutRef,
+    pbr::{ExtendedMaterial, MaterialExtension, MaterialExtensionKey, MaterialExtensionPipeline},
+    prelude::*,
+    render::{
+        render_resource::{AsBindGroup, RenderPipelineDescriptor, SpecializedMeshPipelineError},
+        storage::ShaderBuffer,
+    },
+    shader::ShaderRef,
+};
+
+/// The material of a vessel entity's chunks.
+///
+/// Its `base` is a plain [`StandardMaterial`]: change roughness, clearcoat, emission, blending or the base colour, which
+/// multiplies the segments' own colours, as with any other. One material belongs to each vessel entity; find its handle in
+/// [`SegmentBuffer::material`](super::SegmentBuffer::material).
+pub type SegmentMaterial = ExtendedMaterial<StandardMaterial, SegmentExtension>;
+
+/// The part of [`SegmentMaterial`] that shapes segments in the vertex stage.
+#[derive(Asset, AsBindGroup, Clone, Debug, TypePath)]
+pub struct SegmentExtension {
+    /// [`SegmentInstance`](crate::synthesis::instances::SegmentInstance)s, one per node of the tree.
+    #[storage(100, read_only, visibility(vertex))]
+    pub segments: Handle<ShaderBuffer>,
+}
+
+impl SegmentExtension {
+    fn shader() -> ShaderRef {
+        ShaderRef::Path(
+            bevy::asset::AssetPath::from_path_buf(embedded_path!("segments.wgsl")).with_source("embedded"),
+        )
+    }
+}
+
+impl MaterialExtension for SegmentExtension {
+    fn vertex_shader() -> ShaderRef {
+        Self::shader()
+    }
+
+    fn prepass_vertex_shader() -> ShaderRef {
+        Self::shader()
+    }
+
+    fn deferred_vertex_shader() -> ShaderRef {
+        Self::shader()
+    }
+
+    fn specialize(
+        _pipeline: &MaterialExtensionPipeline,
+        descriptor: &mut RenderPipelineDescriptor,
+        layout: &MeshVertexBufferLayoutRef,
+        _key: MaterialExtensionKey<Self>,
+    ) -> Result<(), SpecializedMeshPipelineError> {
+        // one set of inputs for all passes, which otherwise number their attributes differently
+        descriptor.vertex.buffers = vec![layout.0.get_layout(&[
+            Mesh::ATTRIBUTE_POSITION.at_shader_location(0),
+            Mesh::ATTRIBUTE_UV_0.at_shader_location(1),
+        ])?];
+        // the colour comes out of our vertex stage although the mesh has no such attribute
+        descriptor.vertex.shader_defs.push("VERTEX_COLORS".into());
+        if let Some(fragment) = &mut descriptor.fragment {
+            fragment.shader_defs.push("VERTEX_COLORS".into());
+        }
+        Ok(())
+    }
+}
+
+/// The materials that new vessel entities start from.
+///
+/// Change this resource before vessels appear, or the material of one vessel entity at any time: see
+/// [`SegmentMaterial`]. Base colours multiply the colours of the segments, so they stay white unless a tint is wanted.
+#[derive(Resource, Clone, Debug)]
+pub struct VesselMaterials {
+    /// For arteries.
+    pub arterial: StandardMaterial,
+    /// For veins.
+    pub venous: StandardMaterial,
+}
+
+impl Default for VesselMaterials {
+    /// Moist tissue: rather smooth, with a faint clear film. Veins, thinner of wall, are a little duller.
+    fn default() -> Self {
+        let moist = StandardMaterial {
+            perceptual_roughness: 0.35,
+            reflectance: 0.5,
+            clearcoat: 0.25,
+            clearcoat_perceptual_roughness: 0.25,
+            ..default()
+        };
+        Self { arterial: moist.clone(), venous: StandardMaterial { perceptual_roughness: 0.42, ..moist } }
+    }
+}
+
+impl VesselMaterials {
+    /// The material of a system.
+    pub fn of(&self, system: System) -> &StandardMaterial {
+        match system {
+            System::Arterial => &self.arterial,
+            System::Venous => &self.venous,
+        }
+    }
+}

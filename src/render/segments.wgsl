@@ -1,0 +1,110 @@
+// Vertex stage of vessel segments, for the main, prepass, shadow and deferred passes alike.
+//
+// The mesh is one template, a cone with round ends, many times over. A vertex says which segment of the chunk it belongs
+// to and where on the template it sits; the segment's end points, radii and colour come from a storage buffer, in which
+// the chunk starts at the mesh tag. Slots without length or thickness collapse to a point and draw nothing.
+
+#import bevy_pbr::{
+    mesh_bindings::mesh,
+    mesh_functions,
+    view_transformations::position_world_to_clip,
+}
+#ifdef PREPASS_PIPELINE
+#import bevy_pbr::prepass_io::VertexOutput
+#else
+#import bevy_pbr::forward_io::VertexOutput
+#endif
+
+// `SegmentInstance` of `synthesis::instances`
+struct Segment {
+    start: vec3<f32>,
+    start_radius: f32,
+    end: vec3<f32>,
+    end_radius: f32,
+    color: vec3<f32>,
+    birth: f32,
+}
+
+struct TemplateVertex {
+    @builtin(instance_index) instance_index: u32,
+    // cosine and sine of the angle around the axis; 0 at the start and 1 at the end
+    @location(0) around: vec3<f32>,
+    // segment within the chunk; latitude within the round end, 0 at its rim and 1 at its pole
+    @location(1) place: vec2<f32>,
+}
+
+struct SurfacePoint {
+    position: vec3<f32>,
+    normal: vec3<f32>,
+}
+
+@group(#{MATERIAL_BIND_GROUP}) @binding(100) var<storage, read> segments: array<Segment>;
+
+const QUARTER_TURN: f32 = 1.5707963;
+
+// The point of a segment's surface that a template vertex stands for, in the mesh's local space.
+fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32) -> SurfacePoint {
+    let along = segment.end - segment.start;
+    let distance = length(along);
+    let thickest = max(segment.start_radius, segment.end_radius);
+    if distance == 0.0 || thickest <= 0.0 {
+        return SurfacePoint(segment.start, vec3(0.0, 0.0, 1.0));
+    }
+    let axis = along / distance;
+    let other = select(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), abs(axis.x) > 0.7);
+    let side = normalize(cross(axis, other));
+    let radial = around.x * side + around.y * cross(axis, side);
+
+    // the cone touches both end spheres, so its normals lean towards the thinner end by this angle
+    let lean = asin(clamp((segment.start_radius - segment.end_radius) / distance, -0.999, 0.999));
+    let pole = select(-QUARTER_TURN, QUARTER_TURN, around.z > 0.5);
+    let elevation = mix(lean, pole, latitude);
+    let normal = cos(elevation) * radial + sin(elevation) * axis;
+    let center = mix(segment.start, segment.end, around.z);
+    let radius = mix(segment.start_radius, segment.end_radius, around.z);
+    return SurfacePoint(center + radius * normal, normal);
+}
+
+@vertex
+fn vertex(in: TemplateVertex) -> VertexOutput {
+    let segment = segments[mesh_functions::get_tag(in.instance_index) + u32(in.place.x)];
+    // a mirroring transform turns triangles inside out; running around the other way turns them back
+    let mirror = mesh_functions::sign_determinant_model_3x3m(mesh[in.instance_index].flags);
+    let around = vec3(in.around.x, in.around.y * mirror, in.around.z);
+    let point = surface_point(segment, around, in.place.y);
+    let world_from_local = mesh_functions::get_world_from_local(in.instance_index);
+
+    var out: VertexOutput;
+    out.world_position = mesh_functions::mesh_position_local_to_world(world_from_local, vec4(point.position, 1.0));
+    out.position = position_world_to_clip(out.world_position.xyz);
+#ifdef VERTEX_UVS_A
+    out.uv = vec2(atan2(in.around.y, in.around.x) / (4.0 * QUARTER_TURN) + 0.5, in.around.z);
+#endif
+#ifdef VERTEX_COLORS
+    out.color = vec4(segment.color, 1.0);
+#endif
+#ifdef VERTEX_OUTPUT_INSTANCE_INDEX
+    out.instance_index = in.instance_index;
+#endif
+#ifdef VISIBILITY_RANGE_DITHER
+    out.visibility_range_dither =
+        mesh_functions::get_visibility_range_dither_level(in.instance_index, world_from_local[3]);
+#endif
+
+#ifdef PREPASS_PIPELINE
+#ifdef NORMAL_PREPASS_OR_DEFERRED_PREPASS
+    out.world_normal = mesh_functions::mesh_normal_local_to_world(point.normal, in.instance_index);
+#endif
+#ifdef MOTION_VECTOR_PREPASS
+    out.previous_world_position = mesh_functions::mesh_position_local_to_world(
+        mesh_functions::get_previous_world_from_local(in.instance_index), vec4(point.position, 1.0));
+#endif
+#ifdef UNCLIPPED_DEPTH_ORTHO_EMULATION
+    out.unclipped_depth = out.position.z;
+    out.position.z = min(out.position.z, 1.0);
+#endif
+#else
+    out.world_normal = mesh_functions::mesh_normal_local_to_world(point.normal, in.instance_index);
+#endif
+    return out;
+}

@@ -1,0 +1,403 @@
+//! The large intestine: a procedural colon with haustra, three taeniae coli and a lumen, another for every seed.
+//!
+//! The course (caecum with its appendix, ascending colon, hepatic flexure, transverse colon, splenic flexure, descending
+//! colon, sigmoid, rectum) is a spline that is kept off itself; the wall is swept along it. Between three longitudinal
+//! bands, the taeniae coli, the wall bulges into haustra; between two haustra a semilunar fold reaches into the lumen.
+//! The wall has a thickness. It ends blind in the caecum and is cut open at the rectum, so one can look in.
+//!
+//! The mesh is one closed surface of the topology of a sphere: from the blind end along the outside to the rim, and back
+//! along the inside. `u` runs around the tube from the mesenteric border, `v` along that way, so the chart has no
+//! overlaps. Vertices at `u` = 0 and 1, and those of the two poles, are duplicated.
+//!
+//! ```
+//! use bevy_vessels::synthesis::organ::ColonSettings;
+//!
+//! let colon = ColonSettings { seed: 7, triangles: 20_000, ..Default::default() }.generate()?;
+//! assert!(colon.haustra > 30);
+//! assert!(colon.mesh.signed_volume() > 0.0);
+//! # Ok::<(), bevy_vessels::synthesis::organ::OrganError>(())
+//! ```
+
+mod haustra;
+mod path;
+mod wall;
+
+use super::{OrganError, OrganMesh, RootSites, Viewpoint};
+use crate::synthesis::rng::Stream;
+use bevy_math::{Vec2, Vec3, ops};
+use std::{f32::consts::TAU, ops::Range};
+use wall::{Side, Wall};
+
+/// What a colon looks like. The same settings give the same mesh, bit for bit.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub struct ColonSettings {
+    /// Which colon: course, calibres, haustra and colours vary with it.
+    ///
+    /// Default: 0.
+    pub seed: u64,
+    /// Width across the abdomen, from the ascending to the descending colon's outer side, before variation.
+    ///
+    /// Course and appendix scale with it; calibre and haustra do not.
+    ///
+    /// Units: metres. Limits: 0.05 to 5. Default: [`Self::DEFAULT_WIDTH`].
+    pub width: f32,
+    /// Mean outer diameter. The caecum is about a quarter wider, the descending colon and sigmoid a fifth narrower.
+    ///
+    /// A calibre too large for the width is lowered where limbs would touch or bends close up.
+    ///
+    /// Units: metres. Limits: 0.04 to 0.25 of the width. Default: [`Self::DEFAULT_CALIBRE`].
+    pub calibre: f32,
+    /// Thickness of the wall between two folds.
+    ///
+    /// Units: metres. Limits: 0.01 to 0.15 of the calibre. Default: [`Self::DEFAULT_WALL_THICKNESS`].
+    pub wall_thickness: f32,
+    /// Mean length of a haustrum in a part of mean calibre.
+    ///
+    /// Higher values give fewer and longer haustra.
+    ///
+    /// Units: metres. Limits: 0.25 to 4 calibres. Default: [`Self::DEFAULT_HAUSTRUM_LENGTH`].
+    pub haustrum_length: f32,
+    /// How deep the haustra are: 0 is a smooth tube.
+    ///
+    /// Limits: 0 to 1.2. Default: [`Self::DEFAULT_HAUSTRA_DEPTH`].
+    pub haustra_depth: f32,
+    /// Width of a taenia coli.
+    ///
+    /// Units: metres. Limits: 0 to half a calibre. Default: [`Self::DEFAULT_TAENIA_WIDTH`].
+    pub taenia_width: f32,
+    /// How far colons of different seeds differ in course and calibre: at 0 only haustra and colours do.
+    ///
+    /// Limits: 0 to 1.5. Default: [`Self::DEFAULT_VARIATION`].
+    pub variation: f32,
+    /// Whether the caecum has an appendix: a thin solid stub, without a lumen of its own.
+    ///
+    /// Default: true.
+    pub appendix: bool,
+    /// Number of triangles aimed at; the mesh has within a tenth of it.
+    ///
+    /// Limits: 2,000 to 4,000,000. Default: [`Self::DEFAULT_TRIANGLES`].
+    pub triangles: u32,
+}
+
+impl ColonSettings {
+    /// Within the 25 to 35 cm of an adult abdomen.
+    pub const DEFAULT_WIDTH: f32 = 0.32;
+    /// Within the 4 to 7 cm that radiology texts give for a colon that is not distended.
+    pub const DEFAULT_CALIBRE: f32 = 0.052;
+    /// Within the 1 to 3 mm of a wall on computed tomography.
+    pub const DEFAULT_WALL_THICKNESS: f32 = 0.0028;
+    /// About half the calibre.
+    pub const DEFAULT_HAUSTRUM_LENGTH: f32 = 0.027;
+    /// Haustra as deep as they are drawn in anatomy texts.
+    pub const DEFAULT_HAUSTRA_DEPTH: f32 = 1.0;
+    /// Within the 6 to 12 mm of anatomy texts.
+    pub const DEFAULT_TAENIA_WIDTH: f32 = 0.009;
+    /// As far as colons of adults differ without being remarkable.
+    pub const DEFAULT_VARIATION: f32 = 1.0;
+    /// Enough for round folds in a picture of the whole organ.
+    pub const DEFAULT_TRIANGLES: u32 = 80_000;
+
+    /// Makes the colon.
+    ///
+    /// # Errors
+    /// A setting outside its limits, by name.
+    pub fn generate(&self) -> Result<Colon, OrganError> {
+        self.validate()?;
+        Ok(build(self))
+    }
+
+    /// Checks every setting against its limits.
+    ///
+    /// # Errors
+    /// The first value outside its limits.
+    pub fn validate(&self) -> Result<(), OrganError> {
+        let check = |name, value: f32, range: std::ops::RangeInclusive<f32>, limits| {
+            if range.contains(&value) { Ok(()) } else { Err(OrganError { organ: "colon", name, value, limits }) }
+        };
+        let calibre = self.calibre;
+        check("width", self.width, 0.05..=5.0, "0.05 to 5 m")?;
+        check("calibre", calibre, 0.04 * self.width..=0.25 * self.width, "0.04 to 0.25 of the width")?;
+        let thickness = 0.01 * calibre..=0.15 * calibre;
+        check("wall_thickness", self.wall_thickness, thickness, "0.01 to 0.15 of the calibre")?;
+        let length = 0.25 * calibre..=4.0 * calibre;
+        check("haustrum_length", self.haustrum_length, length, "0.25 to 4 calibres")?;
+        check("haustra_depth", self.haustra_depth, 0.0..=1.2, "0 to 1.2")?;
+        check("taenia_width", self.taenia_width, 0.0..=0.5 * calibre, "0 to half a calibre")?;
+        check("variation", self.variation, 0.0..=1.5, "0 to 1.5")?;
+        check("triangles", self.triangles as f32, 2_000.0..=4_000_000.0, "2,000 to 4,000,000")
+    }
+}
+
+impl Default for ColonSettings {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            width: Self::DEFAULT_WIDTH,
+            calibre: Self::DEFAULT_CALIBRE,
+            wall_thickness: Self::DEFAULT_WALL_THICKNESS,
+            haustrum_length: Self::DEFAULT_HAUSTRUM_LENGTH,
+            haustra_depth: Self::DEFAULT_HAUSTRA_DEPTH,
+            taenia_width: Self::DEFAULT_TAENIA_WIDTH,
+            variation: Self::DEFAULT_VARIATION,
+            appendix: true,
+            triangles: Self::DEFAULT_TRIANGLES,
+        }
+    }
+}
+
+/// A procedural colon.
+///
+/// Axes: x to the patient's left (right in a picture from the front), y up, z to the front.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Colon {
+    /// The closed surface: outer side, rim, inner side, in this order.
+    pub mesh: OrganMesh,
+    /// The triangles of the outer side, from the blind end to the rim.
+    pub outer: Range<usize>,
+    /// The triangles of the inner side, from the rim to the blind end of the lumen.
+    pub inner: Range<usize>,
+    /// Points of the centre line from the appendix or caecum to the cut end, at equal distances, in metres.
+    pub centre_line: Vec<Vec3>,
+    /// Mean outer radius at each point of the centre line, in metres.
+    pub radii: Vec<f32>,
+    /// Number of haustra: three rows together.
+    pub haustra: usize,
+    /// Where vasa recta reach the outer side, along the mesenteric border.
+    pub roots: RootSites,
+    /// Where vessels reach the inner side: under the taenia at the mesenteric border.
+    pub inner_roots: RootSites,
+    /// From the front, the whole organ in view of a camera with a vertical field of view of 45°.
+    pub front: Viewpoint,
+    /// From before the cut end into the lumen.
+    pub rim: Viewpoint,
+    /// From within the lumen, along its straightest part: what an endoscope sees.
+    pub lumen: Viewpoint,
+}
+
+/// A ring of vertices.
+struct Ring {
+    side: Side,
+    arc: f32,
+    /// Across the rim: 0 on the outer side, 1 on the inner.
+    across_rim: f32,
+}
+
+/// Rings across the rim, between the last of the outer side and the first of the inner.
+const RIM_RINGS: usize = 5;
+
+fn build(settings: &ColonSettings) -> Colon {
+    let wall = Wall::new(settings, &mut Stream::Organ.rng(settings.seed));
+    let outer = profile(&wall, Side::Outer);
+    let inner = profile(&wall, Side::Inner);
+    let length = outer.length + inner.length;
+    // Squarish triangles: rings as far apart as columns are on average, a little closer to carry the folds.
+    let columns = (0.5 * TAU * 0.5 * settings.calibre * settings.triangles as f32 / length).sqrt() / 3.0;
+    let columns = (columns.round() as usize * 3).max(12);
+    let rings = settings.triangles as usize / (2 * columns);
+    let outer_rings = ((rings as f32 * outer.length / length) as usize).max(8);
+    let inner_rings = rings.saturating_sub(outer_rings + RIM_RINGS).max(8);
+
+    let mut sequence: Vec<Ring> =
+        outer.arcs(outer_rings).map(|arc| Ring { side: Side::Outer, arc, across_rim: 0.0 }).collect();
+    sequence.extend((1..=RIM_RINGS).map(|k| Ring {
+        side: Side::Inner,
+        arc: wall.end,
+        across_rim: k as f32 / (RIM_RINGS + 1) as f32,
+    }));
+    let mut inward: Vec<Ring> =
+        inner.arcs(inner_rings).map(|arc| Ring { side: Side::Inner, arc, across_rim: 1.0 }).collect();
+    inward.reverse();
+    sequence.append(&mut inward);
+
+    let mesh = sweep(&wall, &sequence, columns);
+    let strip = |rings: usize| columns + (rings - 2) * 2 * columns;
+    let outer = 0..strip(outer_rings);
+    let inner = mesh.triangles.len() - strip(inner_rings)..mesh.triangles.len();
+    describe(&wall, mesh, outer, inner)
+}
+
+/// The mean radius along one side, by the length of the wall that one walks.
+struct Profile {
+    /// Arc length of the centre line and length along the wall from the blind end, both ascending.
+    samples: Vec<(f32, f32)>,
+    length: f32,
+}
+
+impl Profile {
+    /// Arc lengths of rings at equal distances along the wall, from the blind end to the cut one.
+    fn arcs(&self, rings: usize) -> impl Iterator<Item = f32> + '_ {
+        let mut from = 0;
+        (0..rings).map(move |ring| {
+            let walked = self.length * ring as f32 / (rings - 1) as f32;
+            while from + 2 < self.samples.len() && self.samples[from + 1].1 < walked {
+                from += 1;
+            }
+            let ((arc, start), (next, end)) = (self.samples[from], self.samples[from + 1]);
+            arc + (next - arc) * ((walked - start) / (end - start).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0)
+        })
+    }
+}
+
+fn profile(wall: &Wall, side: Side) -> Profile {
+    const SAMPLES: usize = 3000;
+    let start = wall.start(side);
+    let mut walked = 0.0;
+    let mut last = (start, 0.0);
+    let samples = (0..=SAMPLES)
+        .map(|index| {
+            // Squared: the samples are dense at the pole, where the radius rises steeply.
+            let share = index as f32 / SAMPLES as f32;
+            let arc = start + (wall.end - start) * share * share;
+            let radius = wall.mean_radius(side, arc);
+            let (along, across): (f32, f32) = (arc - last.0, radius - last.1);
+            walked += (along * along + across * across).sqrt();
+            last = (arc, radius);
+            (arc, walked)
+        })
+        .collect();
+    Profile { samples, length: walked }
+}
+
+/// Sweeps the wall along the rings.
+fn sweep(wall: &Wall, rings: &[Ring], columns: usize) -> OrganMesh {
+    let angles: Vec<f32> = (0..=columns).map(|column| column_angle(column, columns)).collect();
+    let row = columns + 1;
+    let mut mesh = OrganMesh::default();
+    let mut shared: Vec<u32> = Vec::with_capacity(rings.len() * row);
+    let mut walked = Vec::with_capacity(rings.len());
+    let mut last: Option<Vec3> = None;
+    for (index, ring) in rings.iter().enumerate() {
+        let pole = index == 0 || index + 1 == rings.len();
+        let vertices = ring_vertices(wall, ring, &angles, pole);
+        let first = mesh.positions.len();
+        let step = last.map_or(0.0, |last: Vec3| last.distance(vertices[columns / 2].0));
+        walked.push(walked.last().copied().unwrap_or(0.0) + step);
+        last = Some(vertices[columns / 2].0);
+        for (column, (position, colour)) in vertices.into_iter().enumerate() {
+            mesh.positions.push(position);
+            mesh.colors.push(colour);
+            let owner = if pole { 0 } else { column % columns };
+            shared.push((first + owner) as u32);
+        }
+    }
+    let length = walked.last().copied().unwrap_or(1.0).max(f32::MIN_POSITIVE);
+    mesh.uvs = walked
+        .iter()
+        .flat_map(|walked| (0..row).map(move |column| Vec2::new(column as f32 / columns as f32, walked / length)))
+        .collect();
+    for ring in 0..rings.len() - 1 {
+        for column in 0..columns {
+            let corner = |ring: usize, column: usize| (ring * row + column) as u32;
+            let [a, b] = [corner(ring, column), corner(ring, column + 1)];
+            let [c, d] = [corner(ring + 1, column), corner(ring + 1, column + 1)];
+            if ring + 2 < rings.len() {
+                mesh.triangles.push([a, d, c]);
+            }
+            if ring > 0 {
+                mesh.triangles.push([a, b, d]);
+            }
+        }
+    }
+    // At the last pole c and d coincide, so there the triangle is a, b and that pole; it is the [a, b, d] above.
+    mesh.compute_normals(&shared);
+    mesh
+}
+
+/// Angle of a column, in radians: columns are closer at the taeniae, whose edges are the sharpest feature around the tube.
+fn column_angle(column: usize, columns: usize) -> f32 {
+    let sectors = haustra::ROWS as f32;
+    let turn = sectors * column as f32 / columns as f32;
+    TAU / sectors * (turn - 0.45 / TAU * ops::sin(TAU * turn))
+}
+
+/// Positions and colours of a ring; the last repeats the first.
+fn ring_vertices(wall: &Wall, ring: &Ring, angles: &[f32], pole: bool) -> Vec<(Vec3, [f32; 4])> {
+    let section = wall.section(ring.side, ring.arc);
+    let outer = (ring.across_rim > 0.0 && ring.across_rim < 1.0).then(|| wall.section(Side::Outer, ring.arc));
+    let mut vertices: Vec<(Vec3, [f32; 4])> = angles
+        .iter()
+        .map(|&angle| {
+            let angle = if pole { 0.0 } else { angle };
+            let mut radius = if pole { 0.0 } else { wall.radius(ring.side, &section, angle) };
+            let mut colour = wall.colour(ring.side, &section, angle);
+            let mut along = 0.0;
+            if let Some(outer) = &outer {
+                // A half circle over the wall's edge.
+                let outer_radius = wall.radius(Side::Outer, outer, angle);
+                let half = 0.5 * (outer_radius - radius);
+                let turn = std::f32::consts::PI * ring.across_rim;
+                radius += half * (1.0 + ops::cos(turn));
+                along = half * ops::sin(turn);
+                colour = super::mix(wall.colour(Side::Outer, outer, angle), colour, ring.across_rim);
+            }
+            let frame = &section.frame;
+            (frame.centre + frame.direction(angle) * radius + frame.tangent * along, colour)
+        })
+        .collect();
+    if let Some(first) = vertices.first().copied()
+        && let Some(last) = vertices.last_mut()
+    {
+        *last = first;
+    }
+    vertices
+}
+
+/// Adds to a mesh what a scene needs beside it.
+fn describe(wall: &Wall, mesh: OrganMesh, outer: Range<usize>, inner: Range<usize>) -> Colon {
+    let (low, high) = mesh.bounds();
+    let centre = 0.5 * (low + high);
+    let height = high.y - low.y;
+    let end = wall.line.at(wall.end);
+    Colon {
+        outer,
+        inner,
+        centre_line: wall.line.frames().iter().map(|frame| frame.centre).collect(),
+        radii: wall.line.arcs().map(|arc| wall.mean_radius(Side::Outer, arc)).collect(),
+        haustra: wall.rows.iter().map(haustra::Row::len).sum(),
+        roots: root_sites(wall, Side::Outer, 12),
+        inner_roots: root_sites(wall, Side::Inner, 24),
+        front: Viewpoint { eye: centre + Vec3::new(0.12, 0.1, 1.5) * height, target: centre, up: Vec3::Y },
+        rim: Viewpoint {
+            eye: end.centre + end.tangent * (3.2 * end.radius),
+            target: end.centre - end.tangent * end.radius,
+            up: Vec3::Y,
+        },
+        lumen: lumen_view(wall),
+        mesh,
+    }
+}
+
+/// The view along the straightest and widest part of the lumen.
+fn lumen_view(wall: &Wall) -> Viewpoint {
+    const CANDIDATES: usize = 60;
+    let ahead = 0.15 * (wall.end - wall.apex);
+    let candidates = (1..CANDIDATES).map(|index| {
+        let arc = wall.apex + ahead + (wall.end - wall.apex - ahead) * index as f32 / CANDIDATES as f32;
+        let (here, there) = (wall.line.at(arc), wall.line.at(arc - ahead));
+        let straight = here.centre.distance(there.centre) / ahead;
+        (straight * straight * straight * here.radius, here.centre, there.centre)
+    });
+    let best = candidates.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, Vec3::ZERO, Vec3::Y));
+    // Along a vertical limb the front of the body is at the top of the picture.
+    let level = (best.2 - best.1).normalize_or(Vec3::X).y.abs() < 0.8;
+    Viewpoint { eye: best.1, target: best.2, up: if level { Vec3::Y } else { Vec3::Z } }
+}
+
+/// Places along the mesenteric border, arteries and veins beside each other.
+fn root_sites(wall: &Wall, side: Side, count: usize) -> RootSites {
+    let mut sites = RootSites::default();
+    let first = wall.apex + 0.04 * (wall.end - wall.apex);
+    let step = (wall.end - first) / count as f32;
+    for index in 0..count {
+        let arc = first + (index as f32 + 0.4) * step;
+        for (shift, points) in [(-0.04, &mut sites.arterial), (0.04, &mut sites.venous)] {
+            let section = wall.section(side, arc + shift * step);
+            let radius = wall.radius(side, &section, 0.0);
+            points.push(section.frame.centre + section.frame.direction(0.0) * radius);
+        }
+    }
+    sites
+}

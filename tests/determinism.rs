@@ -1,0 +1,140 @@
+//! The same seed grows the same vessels, bit for bit: however often, in whatever portions, on any number of threads.
+
+mod common;
+
+use bevy_vessels::synthesis::{
+    colonization::{ColonizationSettings, Growth},
+    roots::Roots,
+    tree::{System, hash_trees},
+};
+use common::{Case, tissues};
+use std::collections::BTreeMap;
+
+/// Many samples a step, so that threads share the work where they can, and few steps.
+fn settings() -> ColonizationSettings {
+    ColonizationSettings { steps: 30, samples: 5000, ..ColonizationSettings::default() }
+}
+
+fn start(case: &Case, seed: u64) -> Growth {
+    Growth::new(case.tissue.clone(), settings(), &case.roots, seed).expect("settings within limits")
+}
+
+/// Everything that a growth gives, as one number and the normals' bits.
+fn outcome(growth: &Growth) -> (u64, Vec<u32>) {
+    let channels = System::ALL.into_iter().flat_map(|system| {
+        let normals = growth.normals(system).iter().flat_map(|normal| normal.to_array()).map(f32::to_bits);
+        normals.chain(growth.birth_steps(system).iter().copied()).collect::<Vec<_>>()
+    });
+    (hash(growth), channels.collect())
+}
+
+fn hash(growth: &Growth) -> u64 {
+    hash_trees(System::ALL.map(|system| growth.tree(system)))
+}
+
+fn grown(case: &Case, seed: u64) -> (u64, Vec<u32>) {
+    let mut growth = start(case, seed);
+    growth.run();
+    let nodes = System::ALL.map(|system| growth.tree(system).len());
+    assert!(nodes[0] > 100 && nodes[1] > 1, "{}: {nodes:?} are too few nodes to compare", case.name);
+    outcome(&growth)
+}
+
+#[test]
+fn a_growth_repeats_itself() {
+    for case in tissues() {
+        assert_eq!(grown(&case, 7), grown(&case, 7), "{}", case.name);
+    }
+}
+
+#[test]
+fn portions_of_steps_change_nothing() {
+    for case in tissues() {
+        let whole = grown(&case, 7);
+        for portion in [1, 3, 7] {
+            let mut growth = start(&case, 7);
+            while !growth.is_finished() {
+                // Between portions, everything is looked at as a frame would.
+                for _ in 0..portion {
+                    growth.step();
+                }
+                for system in System::ALL {
+                    let _ = (growth.vessels(system), growth.drains(system).count());
+                }
+            }
+            assert_eq!(outcome(&growth), whole, "{} in portions of {portion}", case.name);
+        }
+    }
+}
+
+#[test]
+fn steps_after_the_last_change_nothing() {
+    let case = &tissues()[0];
+    let mut growth = start(case, 7);
+    growth.run();
+    let before = outcome(&growth);
+    for _ in 0..5 {
+        let report = growth.step();
+        assert_eq!((report.step, report.sampled, report.born), (growth.settings().steps, 0, 0));
+    }
+    growth.run();
+    assert_eq!(outcome(&growth), before);
+}
+
+#[cfg(feature = "parallel")]
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    for case in tissues() {
+        let mut outcomes = BTreeMap::new();
+        for threads in [1, 2, 3, 8] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            outcomes.insert(threads, pool.install(|| grown(&case, 11)));
+        }
+        for (threads, outcome) in &outcomes {
+            assert_eq!(outcome, &outcomes[&1], "{} on {threads} threads", case.name);
+        }
+    }
+}
+
+#[test]
+fn a_restart_leaves_no_trace_of_what_was() {
+    for case in tissues() {
+        let mut growth = start(&case, 3);
+        growth.run();
+        // Something quite different in between: other lengths, hence another grid, and other channels in use.
+        let other = ColonizationSettings { steps: 8, ..settings().scaled(2.5) };
+        let alone = Roots { venous: Default::default(), ..case.roots.clone() };
+        growth.restart(other, &alone, 4).expect("settings within limits");
+        growth.step();
+        growth.restart(settings(), &case.roots, 7).expect("settings within limits");
+        assert_eq!(growth.steps_done(), 0);
+        growth.run();
+        assert_eq!(outcome(&growth), grown(&case, 7), "{}", case.name);
+    }
+}
+
+#[test]
+fn a_restart_that_fails_changes_nothing() {
+    let case = &tissues()[0];
+    let mut growth = start(case, 7);
+    (0..10).for_each(|_| _ = growth.step());
+    let before = outcome(&growth);
+    let bad = ColonizationSettings { steps: 0, ..settings() };
+    assert!(growth.restart(bad, &case.roots, 1).is_err());
+    assert_eq!((outcome(&growth), growth.steps_done()), (before, 10));
+    growth.run();
+    assert_eq!(outcome(&growth), grown(case, 7));
+}
+
+#[test]
+fn seeds_differ() {
+    for case in tissues() {
+        let mut hashes: Vec<u64> = (0..12).map(|seed| grown(&case, seed).0).collect();
+        // The highest bits of a seed count, too.
+        hashes.extend([1 << 32, 1 << 63, u64::MAX].map(|seed| grown(&case, seed).0));
+        let runs = hashes.len();
+        hashes.sort_unstable();
+        hashes.dedup();
+        assert_eq!(hashes.len(), runs, "{}: two seeds grew the same", case.name);
+    }
+}

@@ -1,0 +1,252 @@
+//! What holds of the vessels after every single step, for every tissue, every kind of settings and several seeds.
+
+mod common;
+
+use bevy_math::Vec3;
+use bevy_vessels::synthesis::{
+    colonization::{AngleSpread, ColonizationSettings, Growth, StepReport, SystemSettings},
+    tissue::{Extent, TissueGrowth},
+    tree::{NO_PARENT, System, VesselTree},
+};
+use common::{Case, tissues};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Steps of each run, fewer than the default so that the matrix stays quick, at the default lengths.
+const STEPS: u32 = 50;
+const SAMPLES: u32 = 500;
+/// How far a node that is brought back may be from the tissue, in tissue lengths of a tissue of size 1: rounding alone.
+const ON_TISSUE: f32 = 1e-5;
+
+/// Default settings in which one thing is changed for both systems.
+fn varied(change: impl Fn(&mut SystemSettings)) -> ColonizationSettings {
+    let mut settings = ColonizationSettings { steps: STEPS, samples: SAMPLES, ..ColonizationSettings::default() };
+    for system in System::ALL {
+        change(settings.system_mut(system));
+    }
+    settings
+}
+
+/// Every switch, and every number at both ends of its limits.
+fn settings() -> Vec<(&'static str, ColonizationSettings)> {
+    let growing = |law: TissueGrowth| varied(|system| system.tissue_growth = law.clone());
+    let unconfined = ColonizationSettings { confine: false, ..varied(|_| {}) };
+    let dense = ColonizationSettings { samples: 3000, steps: 12, ..varied(|_| {}) };
+    vec![
+        ("default", varied(|_| {})),
+        ("unconfined", unconfined),
+        ("many samples", dense),
+        ("direction weight 0", varied(|system| system.direction_weight = 0.0)),
+        ("direction weight 1", varied(|system| system.direction_weight = 1.0)),
+        ("perception 0°", varied(|system| system.perception_angle = 0.0)),
+        ("perception 360°", varied(|system| system.perception_angle = 360.0)),
+        ("always bifurcating", varied(|system| system.bifurcation_threshold = 0.0)),
+        ("never bifurcating", varied(|system| system.bifurcation_threshold = f32::INFINITY)),
+        ("root of summed squares", varied(|system| system.angle_spread = AngleSpread::RootSumOfSquares)),
+        ("exponent 2.05", varied(|system| system.bifurcation_exponent = 2.05)),
+        ("exponent 3.95", varied(|system| system.bifurcation_exponent = 3.95)),
+        ("no lateral sprouts", varied(|system| system.lateral_sprouts = false)),
+        ("root with five vessels", varied(|system| system.root_children = 5)),
+        ("terminal radius kept", varied(|system| system.scale_terminal_radius = false)),
+        ("no tissue growth", growing(TissueGrowth::None)),
+        ("exponential tissue growth", growing(TissueGrowth::Exponential(0.05))),
+        ("shrinking tissue", growing(TissueGrowth::Linear(-0.01))),
+        ("tissue growth by table", growing(TissueGrowth::Table(vec![1.5, 0.7, 2.0]))),
+        ("overshooting steps", varied(|system| system.step_length = 0.08)),
+        ("no birth distances", varied(|system| (system.drain_birth_distance, system.node_birth_distance) = (0.0, 0.0))),
+    ]
+}
+
+/// One run, with what it was before the present step.
+struct Run<'a> {
+    case: &'a Case,
+    growth: Growth,
+    before: [VesselTree; 2],
+    normals_before: [Vec<Vec3>; 2],
+    births_before: [Vec<u32>; 2],
+    drains_before: [usize; 2],
+    scales: [f32; 2],
+}
+
+impl<'a> Run<'a> {
+    fn new(case: &'a Case, settings: ColonizationSettings, seed: u64) -> Self {
+        let growth = Growth::new(case.tissue.clone(), settings, &case.roots, seed).expect("settings within limits");
+        let mut run = Self {
+            case,
+            growth,
+            before: Default::default(),
+            normals_before: Default::default(),
+            births_before: Default::default(),
+            drains_before: [0; 2],
+            scales: [1.0; 2],
+        };
+        run.remember();
+        run
+    }
+
+    fn remember(&mut self) {
+        let growth = &self.growth;
+        self.before = System::ALL.map(|system| growth.tree(system).clone());
+        self.normals_before = System::ALL.map(|system| growth.normals(system).to_vec());
+        self.births_before = System::ALL.map(|system| growth.birth_steps(system).to_vec());
+        self.drains_before = System::ALL.map(|system| growth.drains_left(system));
+        self.scales = System::ALL.map(|system| growth.length_scale(system));
+    }
+
+    /// One step, and everything that must hold after it.
+    fn step(&mut self) {
+        let done = self.growth.steps_done();
+        let report = self.growth.step();
+        assert_eq!(report.step, done + 1);
+        assert_eq!(self.growth.steps_done(), report.step);
+        self.check_report(&report);
+        for system in System::ALL {
+            self.growth.tree(system).validate().unwrap_or_else(|error| panic!("{} tree: {error}", system.name()));
+            self.check_append_only(system, report.step);
+            self.check_new_segments(system);
+            self.check_radii(system);
+            self.check_tissue(system);
+            self.check_vessels(system);
+        }
+        self.remember();
+    }
+
+    fn check_report(&self, report: &StepReport) {
+        assert_eq!(report.sampled, self.growth.settings().samples);
+        assert!(report.born <= report.sampled);
+        for system in System::ALL {
+            let of = report.system(system);
+            assert_eq!(of.first_new_node as usize, self.before[system.index()].len());
+            assert_eq!((of.first_new_node + of.new_nodes) as usize, self.growth.tree(system).len());
+            assert_eq!(of.drains_left as usize, self.growth.drains_left(system));
+            assert_eq!(self.growth.drains(system).count(), self.growth.drains_left(system));
+        }
+        let [arterial, venous] = report.systems;
+        let [arterial_before, venous_before] = self.drains_before.map(|drains| drains as u32);
+        // Written as sums, so that a count below zero cannot hide.
+        assert_eq!(arterial_before + report.born, arterial.drains_left + arterial.supplied);
+        assert_eq!(venous_before + arterial.supplied, venous.drains_left + venous.supplied);
+    }
+
+    /// What was there is there still; every channel has one entry per node.
+    fn check_append_only(&self, system: System, step: u32) {
+        let (index, growth) = (system.index(), &self.growth);
+        let (before, now) = (&self.before[index], growth.tree(system));
+        assert!(now.positions().starts_with(before.positions()), "positions changed");
+        assert!(now.parents().starts_with(before.parents()), "parents changed");
+        assert!(growth.normals(system).starts_with(&self.normals_before[index]), "normals changed");
+        let births = growth.birth_steps(system);
+        assert!(births.starts_with(&self.births_before[index]), "birth steps changed");
+        assert!(births[before.len()..].iter().all(|&birth| birth == step), "a new node of another step");
+        assert_eq!((now.len(), now.len()), (births.len(), growth.normals(system).len()));
+    }
+
+    /// New segments are as long as a step, and leave nodes that may have another child.
+    fn check_new_segments(&self, system: System) {
+        let (growth, tree) = (&self.growth, self.growth.tree(system));
+        let settings = growth.settings().system(system);
+        let step = settings.step_length * self.scales[system.index()];
+        let first_new = self.before[system.index()].len();
+        let grown_from = self.before[system.index()].child_counts();
+        for (node, parent) in tree.segments().filter(|&(node, _)| node >= first_new) {
+            let length = tree.segment_vector(node).length();
+            assert!(length > 0.0, "node {node} lies on its parent");
+            if growth.settings().confine {
+                // Its free end is a step from its parent, hence at most a step from the tissue.
+                assert!(length <= 2.0 * step * 1.001, "segment {node} of length {length}, step {step}");
+            } else {
+                assert!((length / step - 1.0).abs() < 1e-3, "segment {node} of length {length}, step {step}");
+            }
+            assert!(parent < first_new, "node {node} grew from a node of the same step");
+            if !settings.lateral_sprouts && tree.parents()[parent] != NO_PARENT {
+                assert_eq!(grown_from[parent], 0, "node {node} sprouts sideways");
+            }
+        }
+        for (node, count) in tree.child_counts().into_iter().enumerate() {
+            // A root without children may bifurcate, too.
+            let most = if tree.parents()[node] == NO_PARENT { settings.root_children.max(2) } else { 2 };
+            assert!(count <= most, "node {node} has {count} children");
+        }
+    }
+
+    /// Murray's law at every node, in f64 and with the powers of std; and what is said of changed radii.
+    fn check_radii(&self, system: System) {
+        let (tree, before) = (self.growth.tree(system), &self.before[system.index()]);
+        let exponent = f64::from(self.growth.settings().system(system).bifurcation_exponent);
+        let mut sums = vec![0.0; tree.len()];
+        for (node, parent) in tree.segments() {
+            sums[parent] += (f64::from(tree.radii()[node]) / f64::from(tree.radii()[parent])).powf(exponent);
+        }
+        for (node, &sum) in sums.iter().enumerate().filter(|&(_, &sum)| sum > 0.0) {
+            assert!((sum - 1.0).abs() <= 1e-5, "Murray's residual at node {node} is {}", sum - 1.0);
+        }
+
+        let changed = self.growth.changed_radii(system);
+        assert!(changed.windows(2).all(|pair| pair[0] > pair[1]), "changed radii are not from the tips to the roots");
+        let mut upstream_of_new = vec![false; tree.len()];
+        upstream_of_new[before.len()..].fill(true);
+        for (node, parent) in tree.segments().collect::<Vec<_>>().into_iter().rev() {
+            upstream_of_new[parent] |= upstream_of_new[node];
+        }
+        for (node, &radius) in tree.radii().iter().enumerate() {
+            let differs = before.radii().get(node).is_none_or(|old| old.to_bits() != radius.to_bits());
+            let listed = changed.binary_search_by(|other| (node as u32).cmp(other)).is_ok();
+            assert!(listed || !differs, "the radius of node {node} changed and is not listed");
+            assert!(!listed || upstream_of_new[node], "node {node} is listed, yet nothing grew downstream of it");
+        }
+    }
+
+    fn check_tissue(&self, system: System) {
+        let (growth, tissue) = (&self.growth, self.case.tissue.at_step(self.growth.steps_done()));
+        let step = growth.settings().system(system).step_length * self.scales[system.index()];
+        let limit = if growth.settings().confine { ON_TISSUE } else { step };
+        let is_surface = matches!(tissue.extent(), Extent::Area(_));
+        for node in self.before[system.index()].len()..growth.tree(system).len() {
+            let position = growth.tree(system).positions()[node];
+            let nearest = tissue.closest_point(position);
+            let distance = nearest.position.distance(position);
+            assert!(distance <= limit, "node {node} at {position} lies {distance} beside the tissue, over {limit}");
+            let normal = growth.normals(system)[node];
+            let length = if is_surface { 1.0 } else { 0.0 };
+            assert!((normal.length() - length).abs() < 1e-4, "node {node} has the normal {normal}");
+        }
+    }
+
+    /// What is drawn: the tree, lifted off a surface by its radius.
+    fn check_vessels(&self, system: System) {
+        let (tree, normals) = (self.growth.tree(system), self.growth.normals(system));
+        let vessels = self.growth.vessels(system);
+        assert_eq!((vessels.parents(), vessels.radii()), (tree.parents(), tree.radii()));
+        for (node, position) in vessels.positions().iter().enumerate() {
+            let expected = tree.positions()[node] + normals[node] * tree.radii()[node];
+            assert_eq!(*position, expected, "node {node} is not lifted by its radius");
+        }
+    }
+}
+
+/// Grows to the end, checking every step, and counts the nodes.
+fn grow(case: &Case, settings: &ColonizationSettings, seed: u64) -> usize {
+    let mut run = Run::new(case, settings.clone(), seed);
+    while !run.growth.is_finished() {
+        run.step();
+    }
+    System::ALL.map(|system| run.growth.tree(system).len()).iter().sum()
+}
+
+#[test]
+fn every_step_of_every_growth_is_well_formed() {
+    let mut nodes = 0;
+    let mut failed = Vec::new();
+    for case in &tissues() {
+        for (name, settings) in settings() {
+            for seed in 1..=3 {
+                match catch_unwind(AssertUnwindSafe(|| grow(case, &settings, seed))) {
+                    Ok(grown) => nodes += grown,
+                    Err(_) => failed.push(format!("{} with {name}, seed {seed}", case.name)),
+                }
+            }
+        }
+    }
+    println!("{nodes} nodes checked");
+    assert!(failed.is_empty(), "{} growths broke an invariant, see above:\n{}", failed.len(), failed.join("\n"));
+    assert!(nodes > 50_000, "only {nodes} nodes grew: the matrix checks little");
+}

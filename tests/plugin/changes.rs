@@ -1,0 +1,169 @@
+//! Wishes and meshes that change while vessels grow, or come late.
+
+use crate::*;
+use bevy_vessels::{
+    plugin::{GrowthStarted, SegmentChanges},
+    synthesis::tissue::Tissue,
+};
+use std::ptr;
+
+/// Address of the tissue that is grown on, to see whether it was prepared again.
+fn tissue(world: &World, organ: Entity) -> *const () {
+    let state = world.get::<GrowthState>(organ).expect("an organ has a state");
+    state.tissue().map_or(ptr::null(), |tissue: &dyn Tissue| ptr::from_ref(tissue).cast())
+}
+
+fn change(app: &mut App, organ: Entity, change: impl FnOnce(&mut Vasculature)) {
+    change(&mut app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes"));
+}
+
+#[test]
+fn another_seed_or_setting_restarts_at_the_next_frame_on_the_same_tissue() {
+    let mut app = headless(GrowthBudget::Steps(2));
+    let organ = spawn(&mut app, quick());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    let (before, prepared) = (trees(app.world(), organ), tissue(app.world(), organ));
+    change(&mut app, organ, |wish| wish.seed = 8);
+    app.update();
+    assert_eq!(progress(app.world(), organ).step, 2);
+    assert_published(app.world(), organ);
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    assert_ne!(before, trees(app.world(), organ));
+    change(&mut app, organ, |wish| {
+        wish.seed = 0;
+        wish.settings.arterial.step_length *= 0.9;
+    });
+    app.update();
+    assert_eq!(progress(app.world(), organ).step, 2);
+    change(&mut app, organ, |wish| *wish = quick());
+    app.update();
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    assert_eq!(before, trees(app.world(), organ), "what came between leaves no trace");
+    assert_eq!(prepared, tissue(app.world(), organ));
+}
+
+#[test]
+fn a_change_to_the_same_values_restarts_nothing() {
+    let mut app = headless(GrowthBudget::Steps(1));
+    let organ = spawn(&mut app, quick());
+    run_until(&mut app, "step 3", |world| progress(world, organ).step == 3);
+    change(&mut app, organ, |wish| *wish = quick());
+    app.update();
+    assert_eq!(progress(app.world(), organ).step, 4);
+}
+
+#[test]
+fn a_mesh_that_comes_late_is_waited_for() {
+    let mut app = headless(GrowthBudget::default());
+    let handle = app.world().resource::<Assets<Mesh>>().reserve_handle();
+    let organ = app.world_mut().spawn((Mesh3d(handle.clone()), quick())).id();
+    for _ in 0..5 {
+        app.update();
+        assert_eq!(progress(app.world(), organ).phase, GrowthPhase::WaitingForMesh);
+    }
+    let inserted = app.world_mut().resource_mut::<Assets<Mesh>>().insert(handle.id(), sphere());
+    assert!(inserted.is_ok());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    let mut started = MessageCursor::default();
+    assert!(drain::<GrowthStarted>(app.world(), &mut started).len() <= 1);
+}
+
+#[test]
+fn a_replaced_mesh_is_prepared_again() {
+    let mut app = headless(GrowthBudget::Steps(5));
+    let organ = spawn(&mut app, quick());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    let (before, prepared) = (trees(app.world(), organ), tissue(app.world(), organ));
+
+    let cube = add_mesh(&mut app, Cuboid::new(1.0, 0.5, 0.8));
+    app.world_mut().entity_mut(organ).insert(Mesh3d(cube));
+    app.update();
+    assert_ne!(progress(app.world(), organ).phase, GrowthPhase::Finished, "vessels of the old mesh are gone");
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    assert_ne!(before, trees(app.world(), organ));
+    assert_ne!(prepared, tissue(app.world(), organ));
+}
+
+/// Meshes and wishes that change while a tissue is being prepared: what comes out is that of the last.
+#[test]
+fn an_outdated_tissue_never_arrives() {
+    let wish = || quick().with_seed(5);
+    let mut app = headless(GrowthBudget::Steps(100));
+    let large = add_mesh(&mut app, Sphere::new(0.5).mesh().uv(256, 256));
+    let cube = add_mesh(&mut app, Cuboid::new(1.0, 0.5, 0.8));
+    let organ = app.world_mut().spawn((Mesh3d(large), quick())).id();
+    app.update();
+    assert_eq!(progress(app.world(), organ).phase, GrowthPhase::PreparingTissue);
+    app.world_mut().entity_mut(organ).insert(Mesh3d(cube.clone()));
+    app.update();
+    app.world_mut().entity_mut(organ).insert(wish());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    let other = app.world_mut().spawn((Mesh3d(cube), wish())).id();
+    run_to_phase(&mut app, other, GrowthPhase::Finished);
+    assert_eq!(trees(app.world(), organ), trees(app.world(), other));
+}
+
+#[test]
+fn a_mesh_asset_that_is_modified_is_prepared_again() {
+    let mut app = headless(GrowthBudget::Steps(5));
+    let organ = spawn(&mut app, quick());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    let before = trees(app.world(), organ);
+    let id = app.world().get::<Mesh3d>(organ).map(|mesh| mesh.id()).expect("the organ has a mesh");
+    let scaled = sphere().scaled_by(Vec3::new(1.0, 2.0, 1.0));
+    *app.world_mut().resource_mut::<Assets<Mesh>>().get_mut(id).expect("the mesh is there") = scaled;
+    run_until(&mut app, "a restart", |world| progress(world, organ).phase != GrowthPhase::Finished);
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    assert_ne!(before, trees(app.world(), organ));
+    (0..5).for_each(|_| app.update());
+    assert_eq!(progress(app.world(), organ).phase, GrowthPhase::Finished, "once is enough");
+}
+
+#[test]
+fn taking_the_mesh_away_waits_for_another() {
+    let mut app = headless(GrowthBudget::default());
+    let organ = spawn(&mut app, quick());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    app.world_mut().entity_mut(organ).remove::<Mesh3d>();
+    app.update();
+    assert_eq!(progress(app.world(), organ).phase, GrowthPhase::WaitingForMesh);
+    assert!(published(app.world(), organ, System::Arterial).tree().is_empty());
+    let mesh = add_mesh(&mut app, sphere());
+    app.world_mut().entity_mut(organ).insert(Mesh3d(mesh));
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    assert_published(app.world(), organ);
+}
+
+/// A copy of the segments that is brought up to date only where `SegmentChanges` says so, as a renderer does.
+#[test]
+fn segment_changes_are_all_that_a_copy_needs() {
+    let mut app = headless(GrowthBudget::Steps(2));
+    let mut wish = quick();
+    wish.settings.steps = 80;
+    wish.settings.samples = 2000;
+    let organ = spawn(&mut app, wish);
+    let mut copy: Vec<[f32; 8]> = Vec::new();
+    let mut copied = 0;
+    run_until(&mut app, "the end", |world| {
+        if let Some(entity) = vessel_entity(world, organ, System::Arterial) {
+            let tree = published(world, organ, System::Arterial).tree().clone();
+            let mut changes = world.get_mut::<SegmentChanges>(entity).expect("vessels keep their changes");
+            copy.resize(tree.len(), [0.0; 8]);
+            for node in changes.dirty_ranges(tree.len()).flatten() {
+                copy[node] = segment(&tree, node);
+                copied += 1;
+            }
+            changes.clear();
+            assert!((0..tree.len()).all(|node| copy[node] == segment(&tree, node)));
+        }
+        progress(world, organ).is_finished()
+    });
+    assert!(copy.len() > SegmentChanges::CHUNK, "{} segments are too few to tell", copy.len());
+    assert!(copied < copy.len() * 40, "{copied} copies of {} segments: not only what changed", copy.len());
+}
+
+fn segment(tree: &VesselTree, node: usize) -> [f32; 8] {
+    let parent = tree.parents().get(tree.parents()[node] as usize).map_or(node, |_| tree.parents()[node] as usize);
+    let (from, to) = (tree.positions()[parent], tree.positions()[node]);
+    [from.x, from.y, from.z, tree.radii()[parent], to.x, to.y, to.z, tree.radii()[node]]
+}

@@ -1,0 +1,123 @@
+//! The plugin in headless apps: no window, no renderer, no graphics card.
+
+mod budget;
+mod changes;
+mod entities;
+mod errors;
+mod growth;
+
+use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};
+use bevy_vessels::{
+    VesselPlugin,
+    plugin::{
+        GrowthAction, GrowthBudget, GrowthCommand, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthState,
+        OrganVessels, Vasculature, VesselSystem, Vessels,
+    },
+    synthesis::{
+        preset::PresetName,
+        roots::RootPlacement,
+        tree::{System, VesselTree},
+    },
+};
+use std::{
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Steps of the growths in these tests.
+const STEPS: u32 = 30;
+
+/// An app as small as vessels allow.
+fn headless(budget: GrowthBudget) -> App {
+    let mut app = App::new();
+    let growth = GrowthPlugin::default().with_budget(budget);
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, VesselPlugin { growth, ..default() }));
+    app.finish();
+    app.cleanup();
+    app
+}
+
+/// Vessels that grow quickly.
+fn quick() -> Vasculature {
+    let mut vasculature =
+        Vasculature::new(PresetName::Paper).with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::Beside);
+    vasculature.settings.steps = STEPS;
+    vasculature.settings.samples = 500;
+    vasculature
+}
+
+fn sphere() -> Mesh {
+    Sphere::new(0.5).mesh().uv(32, 18)
+}
+
+fn add_mesh(app: &mut App, mesh: impl Into<Mesh>) -> Handle<Mesh> {
+    app.world_mut().resource_mut::<Assets<Mesh>>().add(mesh)
+}
+
+/// Spawns an organ with a sphere's mesh.
+fn spawn(app: &mut App, vasculature: Vasculature) -> Entity {
+    let mesh = add_mesh(app, sphere());
+    app.world_mut().spawn((Mesh3d(mesh), vasculature)).id()
+}
+
+/// Runs frames until something holds.
+#[track_caller]
+fn run_until(app: &mut App, what: &str, mut holds: impl FnMut(&mut World) -> bool) {
+    let start = Instant::now();
+    while !holds(app.world_mut()) {
+        assert!(start.elapsed() < Duration::from_secs(60), "waited in vain: {what}");
+        app.update();
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[track_caller]
+fn run_to_phase(app: &mut App, organ: Entity, phase: GrowthPhase) {
+    run_until(app, &format!("{phase:?}"), |world| progress(world, organ).phase == phase);
+}
+
+fn progress(world: &World, organ: Entity) -> &GrowthProgress {
+    world.get::<GrowthProgress>(organ).expect("an organ has progress")
+}
+
+fn send(app: &mut App, organ: Entity, action: GrowthAction) {
+    app.world_mut().write_message(GrowthCommand::new(organ, action));
+}
+
+/// Collects messages over frames.
+fn drain<M: Message + Clone>(world: &World, cursor: &mut MessageCursor<M>) -> Vec<M> {
+    cursor.read(world.resource::<Messages<M>>()).cloned().collect()
+}
+
+/// The vessel entity of a system.
+fn vessel_entity(world: &World, organ: Entity, system: System) -> Option<Entity> {
+    let vessels = world.get::<OrganVessels>(organ)?;
+    vessels.entities().iter().copied().find(|&entity| world.get::<VesselSystem>(entity) == Some(&VesselSystem(system)))
+}
+
+/// A copy of what is published of a system.
+fn published(world: &World, organ: Entity, system: System) -> Vessels {
+    let entity = vessel_entity(world, organ, system).expect("the system has vessels");
+    world.get::<Vessels>(entity).expect("a vessel entity has vessels").clone()
+}
+
+fn trees(world: &World, organ: Entity) -> [VesselTree; 2] {
+    System::ALL.map(|system| published(world, organ, system).tree().clone())
+}
+
+/// Asserts that what is published is what the growth has, node by node.
+#[track_caller]
+fn assert_published(world: &World, organ: Entity) {
+    let state = world.get::<GrowthState>(organ).expect("an organ has a state");
+    let growth = state.growth().expect("the growth has started");
+    for system in System::ALL {
+        let vessels = published(world, organ, system);
+        assert_eq!(vessels.tree(), &growth.vessels(system), "{}", system.name());
+        assert_eq!(vessels.birth_steps(), growth.birth_steps(system));
+        let (min, max) = (vessels.aabb().min(), vessels.aabb().max());
+        for (position, radius) in vessels.tree().positions().iter().zip(vessels.tree().radii()) {
+            let position = Vec3A::from(*position);
+            assert!((position - *radius).cmpge(min - 1e-5).all() && (position + *radius).cmple(max + 1e-5).all());
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! Draws small pictures of known vessels and looks at their pixels.
+//!
+//! Where there is no graphics adapter every test skips, and says so; with `BEVY_VESSELS_REQUIRE_GPU=1` it fails instead.
+//! A software driver will do. With `BEVY_VESSELS_PICTURES=FOLDER` the pictures are kept.
+
+#![cfg(feature = "render")]
+
+#[path = "../../examples/common/headless.rs"]
+mod headless;
+mod stage;
+
+use bevy::prelude::*;
+use bevy_vessels::{
+    plugin::{SegmentChanges, SegmentColoring, Vessels},
+    render::{SEGMENTS_PER_CHUNK, SegmentBuffer, SegmentMaterial},
+    synthesis::tree::{NO_PARENT, System, VesselTree},
+};
+use stage::{Picture, SIZE, on_stage};
+
+/// A tree of the given nodes: position, parent, radius.
+fn tree(nodes: &[([f32; 3], u32, f32)]) -> VesselTree {
+    let positions = nodes.iter().map(|node| Vec3::from(node.0)).collect();
+    let parents = nodes.iter().map(|node| node.1).collect();
+    let radii = nodes.iter().map(|node| node.2).collect();
+    VesselTree::from_arrays(positions, parents, radii).expect("a well-formed tree")
+}
+
+/// One horizontal segment through the middle of the picture, 40 pixels long and 8 to either side thick.
+fn bar() -> VesselTree {
+    tree(&[([-20.0, 0.0, 0.0], NO_PARENT, 8.0), ([20.0, 0.0, 0.0], 0, 8.0)])
+}
+
+/// A comb of `count` short vertical vessels, each a tree of its own, from left to right.
+fn comb(count: usize) -> VesselTree {
+    let mut nodes = Vec::new();
+    for tooth in 0..count {
+        let x = -56.0 + 112.0 * tooth as f32 / (count - 1).max(1) as f32;
+        nodes.push(([x, -30.0, 0.0], NO_PARENT, 2.0));
+        nodes.push(([x, 30.0, 0.0], 2 * tooth as u32, 2.0));
+    }
+    tree(&nodes)
+}
+
+#[test]
+fn a_segment_is_where_it_belongs_and_as_thick_as_it_says() {
+    on_stage("segment", |stage| {
+        stage.spawn(System::Arterial, &bar());
+        let picture = stage.picture();
+        assert!(picture.is_red(64, 64), "{:?}", picture.at(64, 64));
+        for (x, y) in [(64, 64 - 12), (64, 64 + 12), (64 - 34, 64), (64 + 34, 64), (2, 2)] {
+            assert!(picture.is_background(x, y), "vessel at {x}, {y}");
+        }
+        assert_near(picture.height_at(64), 16, 2);
+        // the flat end at the root has a shallow cap, the far end a round one
+        let row = picture.width_at(64);
+        assert!((44..=58).contains(&row), "{row} pixels long with both ends");
+        assert!(picture.is_vessel(64 + 26, 64), "the far end is round and reaches a radius beyond the node");
+        assert!(picture.is_background(64 + 26, 64 - 7), "round, not square");
+    });
+}
+
+#[test]
+fn radii_of_both_ends_are_respected() {
+    on_stage("cone", |stage| {
+        let cone = tree(&[([-40.0, 0.0, 0.0], NO_PARENT, 13.0), ([40.0, 0.0, 0.0], 0, 10.0)]);
+        stage.spawn(System::Arterial, &cone);
+        let picture = stage.picture();
+        assert_near(picture.height_at(64 - 38), 26, 2);
+        assert_near(picture.height_at(64), 23, 2);
+        assert_near(picture.height_at(64 + 38), 20, 2);
+    });
+}
+
+#[test]
+fn surfaces_face_outwards_and_are_lit_from_the_light() {
+    on_stage("light", |stage| {
+        stage.spawn(System::Arterial, &bar());
+        let picture = stage.picture();
+        // the light comes from above and the camera's side
+        let [top, middle, bottom] = [58, 64, 70].map(|y| picture.brightness(64, y));
+        assert!(top > bottom * 1.3 && middle > bottom, "{top} {middle} {bottom}");
+        assert!(bottom > 0.0, "ambient light reaches the far side");
+    });
+}
+
+#[test]
+fn mirrored_and_stretched_organs_are_drawn_right() {
+    on_stage("mirror", |stage| {
+        let organ = stage.spawn(System::Arterial, &bar());
+        stage.set_transform(organ, Transform::from_scale(Vec3::new(-1.0, 1.0, 1.0)));
+        let mirrored = stage.picture();
+        assert_near(mirrored.height_at(64), 16, 2);
+        let [top, bottom] = [58, 70].map(|y| mirrored.brightness(64, y));
+        assert!(top > bottom * 1.3, "inside out: {top} {bottom}");
+        stage.set_transform(organ, Transform::from_scale(Vec3::new(1.0, 2.0, 1.0)).with_translation(Vec3::X * 10.0));
+        let stretched = stage.picture();
+        assert_near(stretched.height_at(74), 32, 3);
+        assert!(stretched.is_background(64 - 26, 64), "the whole hierarchy moved");
+    });
+}
+
+#[test]
+fn slots_without_a_segment_are_invisible() {
+    on_stage("empty", |stage| {
+        // a root and a child on the same spot; a chunk has 254 more slots, all empty, at the origin
+        let nothing = tree(&[([0.0, 0.0, 0.0], NO_PARENT, 9.0), ([30.0, 0.0, 0.0], NO_PARENT, 9.0)]);
+        let organ = stage.spawn(System::Arterial, &nothing);
+        let picture = stage.picture();
+        assert_eq!(picture.vessel_pixels(), 0);
+        assert_eq!(stage.chunks(organ).len(), 1);
+    });
+}
+
+#[test]
+fn growth_appears_through_range_writes_and_larger_buffers() {
+    on_stage("growth", |stage| {
+        let full = comb(SEGMENTS_PER_CHUNK);
+        let organ = stage.spawn(System::Arterial, &comb(2));
+        let before = stage.picture();
+        // half of the comb is one chunk, all of it two: the second picture needs a larger buffer and a new chunk
+        stage.replace(organ, &full, 4..full.len());
+        let after = stage.picture();
+        assert_eq!(stage.chunks(organ).len(), 2);
+        let [few, many] = [&before, &after].map(Picture::vessel_pixels);
+        assert!(few > 0 && many > 10 * few, "{few} {many}");
+        for x in [64 - 50, 64 - 1, 64 + 1, 64 + 50] {
+            assert!(after.is_vessel(x, 64), "a tooth at {x}: the first chunk kept its segments");
+        }
+    });
+}
+
+#[test]
+fn only_marked_ranges_are_written_again() {
+    on_stage("ranges", |stage| {
+        let organ = stage.spawn(System::Arterial, &comb(SEGMENTS_PER_CHUNK));
+        let before = stage.picture();
+        // everything moved out of view, but only the second chunk was said to have changed
+        let gone = tree(&vec![([500.0, 0.0, 0.0], NO_PARENT, 1.0); 2 * SEGMENTS_PER_CHUNK]);
+        stage.replace(organ, &gone, SEGMENTS_PER_CHUNK..SEGMENTS_PER_CHUNK + 1);
+        let after = stage.picture();
+        assert!(before.is_vessel(64 - 40, 64) && before.is_vessel(64 + 40, 64));
+        assert!(after.is_vessel(64 - 40, 64), "the first chunk is as it was");
+        assert!(after.is_background(64 + 40, 64), "the second one is gone");
+    });
+}
+
+#[test]
+fn a_restart_clears_what_was_there() {
+    on_stage("restart", |stage| {
+        let organ = stage.spawn(System::Arterial, &comb(SEGMENTS_PER_CHUNK));
+        stage.picture();
+        stage.replace(organ, &bar(), 0..2);
+        let picture = stage.picture();
+        assert!(picture.is_vessel(64, 64));
+        assert!(picture.is_background(64, 64 - 20) && picture.is_background(64 + 40, 64), "stale segments");
+        assert_eq!(stage.chunks(organ).len(), 1);
+        stage.replace(organ, &VesselTree::new(), 0..0);
+        assert_eq!(stage.picture().vessel_pixels(), 0);
+        assert!(stage.chunks(organ).is_empty());
+    });
+}
+
+#[test]
+fn despawning_the_organ_removes_chunks_and_buffers() {
+    on_stage("despawn", |stage| {
+        let organ = stage.spawn(System::Arterial, &bar());
+        stage.picture();
+        let before = stage.assets();
+        assert_eq!(before, [1, 1], "a buffer and a material");
+        stage.app.world_mut().despawn(organ);
+        assert_eq!(stage.picture().vessel_pixels(), 0);
+        assert_eq!(stage.assets(), [0, 0]);
+        assert_eq!(stage.chunk_count(), 0);
+    });
+}
+
+#[test]
+fn losing_the_vessels_alone_removes_the_drawing() {
+    on_stage("detach", |stage| {
+        let organ = stage.spawn(System::Arterial, &bar());
+        stage.picture();
+        let vessels = stage.vessels(organ);
+        stage.app.world_mut().entity_mut(vessels).remove::<Vessels>();
+        assert_eq!(stage.picture().vessel_pixels(), 0);
+        assert_eq!((stage.assets(), stage.chunk_count()), ([0, 0], 0));
+    });
+}
+
+#[test]
+fn systems_have_their_colours_and_can_be_hidden() {
+    on_stage("systems", |stage| {
+        let organ = stage.spawn(System::Venous, &bar());
+        let vein = stage.picture();
+        assert!(vein.is_blue(64, 64), "{:?}", vein.at(64, 64));
+        stage.appearance(organ, |look| look.venous = Color::srgb(0.1, 0.6, 0.1));
+        let [r, g, b] = stage.picture().at(64, 64);
+        assert!(g > r && g > b, "the new colour is there at the next frame");
+        stage.appearance(organ, |look| look.show_venous = false);
+        assert_eq!(stage.picture().vessel_pixels(), 0);
+        stage.appearance(organ, |look| look.show_venous = true);
+        assert!(stage.picture().is_vessel(64, 64));
+    });
+}
+
+#[test]
+fn colours_tell_radius_age_and_order() {
+    on_stage("colours", |stage| {
+        // a trunk that splits in two, and a thin old branch below
+        let nodes = [
+            ([-50.0, 20.0, 0.0], NO_PARENT, 12.0),
+            ([0.0, 20.0, 0.0], 0, 12.0),
+            ([50.0, 30.0, 0.0], 1, 6.0),
+            ([50.0, 10.0, 0.0], 1, 6.0),
+            ([-50.0, -30.0, 0.0], NO_PARENT, 3.0),
+            ([50.0, -30.0, 0.0], 4, 3.0),
+        ];
+        let organ = stage.spawn_born(System::Arterial, &tree(&nodes), &[0, 40, 80, 80, 0, 1]);
+        let (trunk, thin) = ((40, 64 - 20), (64, 64 + 30));
+        let mut seen = Vec::new();
+        for coloring in [SegmentColoring::Radius, SegmentColoring::Age, SegmentColoring::StrahlerOrder] {
+            stage.appearance(organ, |look| look.coloring = coloring);
+            let picture = stage.picture();
+            let [trunk, thin] = [trunk, thin].map(|(x, y)| picture.at(x, y));
+            assert!(distance(trunk, thin) > 40, "{coloring:?}: {trunk:?} and {thin:?} look alike");
+            assert!(!seen.contains(&trunk), "{coloring:?} looks like another");
+            seen.push(trunk);
+        }
+        stage.appearance(organ, |look| look.coloring = SegmentColoring::System);
+        let picture = stage.picture();
+        assert!(picture.is_red(trunk.0, trunk.1) && picture.is_red(thin.0, thin.1));
+    });
+}
+
+#[test]
+fn vessels_cast_shadows_and_receive_them() {
+    on_stage("shadow", |stage| {
+        stage.spawn_wall();
+        let lit = stage.picture();
+        stage.spawn(System::Arterial, &bar());
+        let shaded = stage.picture();
+        // the light comes from above: the shadow on the wall behind lies below the vessel
+        let darkest = (64 + 10..64 + 40).map(|y| shaded.brightness(64, y) / lit.brightness(64, y)).fold(1.0, f32::min);
+        assert!(darkest < 0.7, "the wall has {darkest} of its light below the vessel");
+        let above = shaded.brightness(64, 64 - 40) / lit.brightness(64, 64 - 40);
+        assert!(above > 0.95, "and {above} above it");
+    });
+}
+
+#[test]
+fn prepasses_see_the_same_surface() {
+    on_stage("prepass", |stage| {
+        stage.spawn(System::Arterial, &bar());
+        let plain = stage.picture();
+        stage.with_prepasses(|stage| {
+            let again = stage.picture();
+            let differing = (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y)));
+            let differing = differing.filter(|&(x, y)| distance(plain.at(x, y), again.at(x, y)) > 24).count();
+            assert!(differing < 40, "{differing} pixels differ: depths of the prepass don't match");
+        });
+    });
+}
+
+#[test]
+fn boxes_follow_growth_so_that_nothing_in_view_is_culled() {
+    on_stage("culling", |stage| {
+        // the chunk begins far out of view; what grows into view last must be drawn
+        let far = [([900.0, 0.0, 0.0], NO_PARENT, 1.0), ([910.0, 0.0, 0.0], 0, 1.0)];
+        let organ = stage.spawn(System::Arterial, &tree(&far));
+        assert_eq!(stage.picture().vessel_pixels(), 0);
+        assert_eq!(stage.visible_chunks(), 0, "what is out of view is culled");
+        let mut grown = far.to_vec();
+        grown.extend([([-10.0, 0.0, 0.0], NO_PARENT, 8.0), ([10.0, 0.0, 0.0], 2, 8.0)]);
+        stage.replace(organ, &tree(&grown), 2..4);
+        assert!(stage.picture().is_vessel(64, 64));
+        // beyond the node itself by its radius: a segment whose axis is out of view, but whose side is in
+        let beside = [([-30.0, 74.0, 0.0], NO_PARENT, 20.0), ([30.0, 74.0, 0.0], 0, 20.0)];
+        stage.replace(organ, &tree(&beside), 0..2);
+        assert!(stage.picture().is_vessel(64, 3), "a vessel's side at the edge of the picture");
+    });
+}
+
+#[test]
+fn nothing_is_done_when_nothing_changed() {
+    on_stage("idle", |stage| {
+        let organ = stage.spawn(System::Arterial, &bar());
+        stage.picture();
+        let vessels = stage.vessels(organ);
+        let world = stage.app.world();
+        let changed = world.entity(vessels).get_ref::<SegmentBuffer>().expect("drawn").last_changed();
+        assert!(world.entity(vessels).get::<SegmentChanges>().expect("required").is_empty(), "changes were taken");
+        stage.app.update();
+        let world = stage.app.world();
+        let buffer = world.entity(vessels).get_ref::<SegmentBuffer>().expect("drawn");
+        assert_eq!(buffer.last_changed().get(), changed.get(), "an idle frame touches the buffer");
+    });
+}
+
+#[test]
+fn users_can_change_the_material() {
+    on_stage("material", |stage| {
+        let organ = stage.spawn(System::Arterial, &bar());
+        stage.picture();
+        let vessels = stage.vessels(organ);
+        let material = stage.app.world().get::<SegmentBuffer>(vessels).expect("drawn").material().clone();
+        let mut materials = stage.app.world_mut().resource_mut::<Assets<SegmentMaterial>>();
+        materials.get_mut(&material).expect("alive").base.emissive = LinearRgba::rgb(0.0, 80.0, 0.0);
+        let [r, g, b] = stage.picture().at(64, 64);
+        assert!(g > r && g > b, "{:?}", [r, g, b]);
+    });
+}
+
+fn distance(a: [u8; 3], b: [u8; 3]) -> u32 {
+    a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(b))).sum()
+}
+
+#[track_caller]
+fn assert_near(value: usize, expected: usize, tolerance: usize) {
+    assert!(value.abs_diff(expected) <= tolerance, "{value}, not {expected} ± {tolerance} pixels");
+}
+
