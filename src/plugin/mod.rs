@@ -18,6 +18,7 @@ mod growth;
 mod growth_state;
 mod messages;
 mod organ_mesh;
+mod procedural;
 mod publish;
 mod segment_changes;
 mod tissue_source;

@@ -42,6 +42,9 @@ struct SurfacePoint {
 
 const QUARTER_TURN: f32 = 1.5707963;
 
+// Height of the shallow dome that closes a segment's start, in radii.
+const START_DOME: f32 = 0.4;
+
 // The point of a segment's surface that a template vertex stands for, in the mesh's local space.
 fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32) -> SurfacePoint {
     let along = segment.end - segment.start;
@@ -62,7 +65,9 @@ fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32) -> SurfaceP
     let normal = cos(elevation) * radial + sin(elevation) * axis;
     let center = mix(segment.start, segment.end, around.z);
     let radius = mix(segment.start_radius, segment.end_radius, around.z);
-    return SurfacePoint(center + radius * normal, normal);
+    // the start has no rings of its own: a full pole would make a point of it where a vessel begins
+    let reach = select(1.0, START_DOME, latitude == 1.0 && around.z < 0.5);
+    return SurfacePoint(center + reach * radius * normal, normal);
 }
 
 @vertex

@@ -8,10 +8,7 @@ use crate::headless::{
 };
 use bevy::{
     camera::{RenderTarget, ScalingMode, visibility::ViewVisibility},
-    core_pipeline::{
-        prepass::{DepthPrepass, MotionVectorPrepass, NormalPrepass},
-        tonemapping::Tonemapping,
-    },
+    core_pipeline::tonemapping::Tonemapping,
     light::CascadeShadowConfigBuilder,
     log::LogPlugin,
     prelude::*,
@@ -72,7 +69,11 @@ pub fn on_stage(name: &'static str, test: impl FnOnce(&mut Stage) + Send + 'stat
     let (done, outcome) = channel();
     stage.send((name, Box::new(test), done)).expect("the stage lives as long as the tests");
     if let Err(panic) = outcome.recv().expect("the stage answers") {
-        resume_unwind(panic);
+        // the stage's own output belongs to the test that opened it, so the message is said again here
+        match panic.downcast::<String>() {
+            Ok(message) => panic!("{message}"),
+            Err(panic) => resume_unwind(panic),
+        }
     }
 }
 
@@ -194,11 +195,11 @@ impl Stage {
         self.app.world_mut().entity_mut(organ).insert(transform);
     }
 
-    /// Draws with depth, normal and motion prepasses for a while.
-    pub fn with_prepasses(&mut self, draw: impl FnOnce(&mut Self)) {
-        self.app.world_mut().entity_mut(self.camera).insert((DepthPrepass, NormalPrepass, MotionVectorPrepass));
+    /// Draws for a while with further components on the camera.
+    pub fn with_on_camera<B: Bundle>(&mut self, components: B, draw: impl FnOnce(&mut Self)) {
+        self.app.world_mut().entity_mut(self.camera).insert(components);
         let outcome = catch_unwind(AssertUnwindSafe(|| draw(self)));
-        self.app.world_mut().entity_mut(self.camera).remove::<(DepthPrepass, NormalPrepass, MotionVectorPrepass)>();
+        self.app.world_mut().entity_mut(self.camera).remove::<B>();
         if let Err(panic) = outcome {
             resume_unwind(panic);
         }
