@@ -31,7 +31,13 @@ const STEPS: u32 = 30;
 fn headless(budget: GrowthBudget) -> App {
     let mut app = App::new();
     let growth = GrowthPlugin::default().with_budget(budget);
-    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, VesselPlugin { growth, ..default() }));
+    app.add_plugins((
+        MinimalPlugins,
+        AssetPlugin::default(),
+        MeshPlugin,
+        TransformPlugin,
+        VesselPlugin { growth, ..default() },
+    ));
     app.finish();
     app.cleanup();
     app

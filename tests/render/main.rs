@@ -317,4 +317,3 @@ fn distance(a: [u8; 3], b: [u8; 3]) -> u32 {
 fn assert_near(value: usize, expected: usize, tolerance: usize) {
     assert!(value.abs_diff(expected) <= tolerance, "{value}, not {expected} ± {tolerance} pixels");
 }
-
