@@ -61,7 +61,7 @@ impl Grid {
         // So many that the last centre along each axis lies behind the mesh.
         let size = ((max - min) / cell + PADDING + 0.5).floor() + 1.0;
         let voxels = size.element_product();
-        if !(voxels <= Self::MAX_VOXELS as f64) {
+        if voxels > Self::MAX_VOXELS as f64 {
             return Err(TissueError::TooManyVoxels { resolution, voxels });
         }
         Ok(Self { origin: min - PADDING * cell, cell, size: size.to_array().map(|count| count as usize) })
