@@ -111,7 +111,7 @@ impl Plugin for GrowthPlugin {
                 )
                     .chain()
                     .in_set(VesselSystems::Source),
-                growth::grow.in_set(VesselSystems::Grow),
+                (growth::grow, growth::end_growths).chain().in_set(VesselSystems::Grow),
                 (publish::publish_vessels, publish::show_systems, diagnostics::measure)
                     .chain()
                     .in_set(VesselSystems::Publish),

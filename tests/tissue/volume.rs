@@ -60,7 +60,7 @@ fn volume_of(tissue: &MeshVolume) -> f32 {
 
 #[track_caller]
 fn assert_volume(mesh: &TriangleMesh, expected: f32) -> MeshVolume {
-    let volume = MeshVolume::new(mesh, 64).unwrap();
+    let volume = MeshVolume::new(mesh, 64).unwrap_or_else(|error| panic!("{error}"));
     let found = volume_of(&volume);
     assert!((found / expected - 1.0).abs() < 0.02, "volume {found}, expected {expected}");
     samples(&volume, 2000, 3);

@@ -155,13 +155,21 @@ impl MeshTopology {
         self.boundary_edges() == 0
     }
 
-    /// Whether every edge is run along as often one way as the other, so that every point is enclosed a whole number of
-    /// times, from whichever side one looks. `flip` says which triangles count as reversed.
-    pub fn is_balanced(&self, flip: impl Fn(usize) -> bool) -> bool {
-        self.fans().all(|fan| {
+    /// Which triangles have an edge that is run along more often one way than the other. `flip` says which triangles count
+    /// as reversed.
+    ///
+    /// Where there is none, every point is enclosed a whole number of times, from whichever side one looks.
+    pub fn unbalanced(&self, flip: impl Fn(usize) -> bool) -> Vec<bool> {
+        let mut unbalanced = vec![false; self.triangles.len()];
+        for fan in self.fans() {
             let forward = fan.iter().filter(|edge| edge.forward != flip(edge.triangle as usize)).count();
-            2 * forward == fan.len()
-        })
+            if 2 * forward != fan.len() {
+                for edge in fan {
+                    unbalanced[edge.triangle as usize] = true;
+                }
+            }
+        }
+        unbalanced
     }
 
     /// Vertices − edges + triangles, over what non-degenerate triangles use: 2 for a ball, 0 for a torus.

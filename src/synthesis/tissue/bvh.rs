@@ -185,8 +185,8 @@ impl BoxTree {
     }
 
     /// Visits every box that has a point in common with `region`, until `visit` returns false.
-    pub fn overlapping(&self, region: &Bounds, mut visit: impl FnMut(usize) -> bool) {
-        self.walk(|bounds| bounds.overlaps(region), |slot| visit(slot));
+    pub fn overlapping(&self, region: &Bounds, visit: impl FnMut(usize) -> bool) {
+        self.walk(|bounds| bounds.overlaps(region), visit);
     }
 
     /// Visits boxes along the segment between two points, as long as they can be met before what was found.
@@ -238,7 +238,8 @@ fn split(items: &mut [Item], centres: &Bounds, depth: u32) -> usize {
     let axis = size.max_position();
     let half = items.len() / 2;
     // Centres that coincide can only be told apart by number; so can those of degenerate extents.
-    if depth >= DEEP || !(size[axis] > 0.0) {
+    let apart = size[axis] > 0.0;
+    if depth >= DEEP || !apart {
         items.select_nth_unstable_by(half, |a, b| a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.id.cmp(&b.id)));
         return half;
     }

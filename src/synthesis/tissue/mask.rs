@@ -133,7 +133,7 @@ impl Mask {
     /// Runs of set cells along x.
     fn list_runs(&self) -> Vec<Bounds> {
         self.set
-            .chunk_by(|&a, &b| b == a + 1 && b as usize % self.size[0] != 0)
+            .chunk_by(|&a, &b| b == a + 1 && !(b as usize).is_multiple_of(self.size[0]))
             .map(|run| {
                 let min = self.corner(run[0] as usize, Vec3::ZERO);
                 let max = self.corner(run[run.len() - 1] as usize, Vec3::ONE);
@@ -199,8 +199,8 @@ impl Tissue for Mask {
 
     fn contains(&self, point: Vec3) -> bool {
         let tolerance = self.tolerance();
-        let off_plane = self.flat && !((point.z - self.origin.z).abs() <= tolerance);
-        !off_plane
+        let in_plane = !self.flat || (point.z - self.origin.z).abs() <= tolerance;
+        in_plane
             && (self.cell(point).is_some_and(|cell| self.cells.contains(cell))
                 || self.nearest(point, tolerance).is_some())
     }

@@ -10,8 +10,8 @@ const PROBES: usize = 9;
 /// Turns triangles that face the other way than those around them, and closed shells that face the other way than the
 /// largest, unless they are cavities in it. `index` is that of the mesh.
 ///
-/// Also tells whether the result is closed, so that winding numbers are exact.
-pub(super) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> (TriangleMesh, bool) {
+/// Also tells of which triangles the neighbours are missing or out of order: of none if the result is closed.
+pub(super) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> (TriangleMesh, Vec<bool>) {
     let topology = mesh.topology();
     let misoriented = topology.misoriented(&mesh);
     let mesh = mesh.with_flipped(|triangle| misoriented[triangle]);
@@ -21,10 +21,10 @@ pub(super) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> (TriangleMe
         volumes.iter().fold(0.0f64, |largest, volume| if volume.abs() > largest.abs() { *volume } else { largest });
     let against: Vec<bool> =
         volumes.iter().zip(closed).map(|(volume, closed)| closed && volume * largest < 0.0).collect();
-    let balanced =
-        |turned: &dyn Fn(usize) -> bool| topology.is_balanced(|triangle| misoriented[triangle] != turned(triangle));
+    let loose =
+        |turned: &dyn Fn(usize) -> bool| topology.unbalanced(|triangle| misoriented[triangle] != turned(triangle));
     if !against.contains(&true) {
-        return (mesh, balanced(&|_| false));
+        return (mesh, loose(&|_| false));
     }
     let mut members = vec![Vec::new(); patches.count];
     for (triangle, patch) in patches.of_triangle.iter().enumerate() {
@@ -41,8 +41,8 @@ pub(super) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> (TriangleMe
         })
         .collect();
     let turned = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| flip[patch as usize]);
-    let closed = balanced(&turned);
-    (mesh.with_flipped(turned), closed)
+    let loose = loose(&turned);
+    (mesh.with_flipped(turned), loose)
 }
 
 /// Signed volume of every part of the surface.

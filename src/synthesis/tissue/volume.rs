@@ -1,8 +1,8 @@
 //! The inside of an organ's mesh as a tissue.
 //!
 //! The mesh is voxelised once. Voxels that its surface does not touch are inside or outside as a whole. In the others the
-//! mesh itself is asked: where it is closed, a point is on the same side as the voxel's centre if the triangles between
-//! them cancel out; where it is open, six rays vote. So the boundary is that of the mesh and not that of the voxels.
+//! mesh itself is asked: a point is on the same side as the voxel's centre if the triangles between them cancel out; where an
+//! open mesh leaves doubt about the centre, six rays from the point vote. So the boundary is that of the mesh and not that of the voxels.
 //!
 //! Inside is what the mesh winds around. That forgives duplicated vertices, small holes, overlapping and nested shells and
 //! triangles that face the wrong way.
@@ -13,7 +13,7 @@ use super::{
     error::TissueError,
     orientation::oriented,
     triangle::TriangleIndex,
-    voxels::{BitGrid, Grid, MAJORITY, crossing},
+    voxels::{BitGrid, Finding, Grid, MAJORITY, crossing},
 };
 use crate::synthesis::{mesh::TriangleMesh, rng::VesselRng};
 use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
@@ -30,7 +30,7 @@ pub struct MeshVolume {
     index: TriangleIndex,
     bounds: Aabb3d,
     volume: f32,
-    /// Whether the mesh is closed, so that a point can be compared with its voxel's centre.
+    /// Whether the mesh is closed.
     closed: bool,
     /// Corners of every triangle.
     corners: Vec<[Vec3; 3]>,
@@ -54,16 +54,16 @@ struct Cell {
     first: u32,
     /// How often its centre is enclosed.
     winding: i16,
+    /// Whether that is certain, so that points of the voxel can be compared with it.
+    certain: bool,
 }
 
 impl MeshVolume {
     /// Voxels along the longest side of the mesh's box, if nothing else is asked for.
     pub const DEFAULT_RESOLUTION: u32 = 128;
 
-    /// Points of the touched voxels by which a closed mesh's volume is measured.
+    /// Points of the touched voxels by which the volume is measured.
     const PROBES: usize = 1 << 16;
-    /// The same for an open mesh, where each takes longer.
-    const OPEN_PROBES: usize = 1 << 13;
     /// Most draws for a sample. Of the voxels that are drawn from, more than a tenth of the space is inside.
     const TRIES: u32 = 128;
     /// How far a point that is brought in comes to lie inside, in voxels: the first of these that is inside.
@@ -84,13 +84,14 @@ impl MeshVolume {
         let grid = Grid::over(&mesh.bounds(), resolution)?;
         let mesh = mesh.welded();
         let index = TriangleIndex::new(&mesh);
-        let (mesh, closed) = oriented(mesh, &index);
+        let (mesh, loose) = oriented(mesh, &index);
+        let closed = !loose.contains(&true);
         let touches = grid.touches(&mesh)?;
-        let windings = if closed { grid.windings(&mesh) } else { grid.votes(&mesh) };
+        let findings = grid.findings(&mesh, closed);
         let touched = BitGrid::new(grid.len(), touches.iter().map(|&(voxel, _)| voxel as usize));
-        let enclosed = |voxel: &usize| windings[*voxel] != 0 && !touched.contains(*voxel);
+        let enclosed = |voxel: &usize| findings[*voxel].is_inside() && !touched.contains(*voxel);
         let inside = BitGrid::new(grid.len(), (0..grid.len()).filter(enclosed));
-        let (cells, triangles) = cells(&touched, &touches, &windings);
+        let (cells, triangles) = cells(&touched, &touches, &findings, &loose);
         let mut volume = Self {
             whole: inside.iter().map(|voxel| voxel as u32).collect(),
             corners: (0..mesh.triangles().len()).map(|triangle| mesh.corners(triangle)).collect(),
@@ -125,23 +126,22 @@ impl MeshVolume {
 
     /// Volume: whole voxels, and touched ones by the share of their points that are inside.
     fn measure(&self) -> f32 {
-        let probes = if self.closed { Self::PROBES } else { Self::OPEN_PROBES };
         let inside = |probe: &usize| {
-            let slot = probe * self.touched_voxels() / probes;
+            let slot = probe * self.touched_voxels() / Self::PROBES;
             let corner = self.grid.corner(self.cells[slot].voxel as usize);
             self.is_inside(slot, self.grid.global(corner + (EVEN_STEPS * (*probe as f64)).fract()))
         };
-        let share = (0..probes).filter(inside).count() as f64 / probes as f64;
+        let share = (0..Self::PROBES).filter(inside).count() as f64 / Self::PROBES as f64;
         let cell = self.grid.cell();
         ((self.whole.len() as f64 + share * self.touched_voxels() as f64) * cell * cell * cell) as f32
     }
 
     /// Whether a point is inside, in a voxel that the surface touches.
     fn is_inside(&self, slot: usize, point: Vec3) -> bool {
-        if !self.closed {
+        let [cell, next] = [self.cells[slot], self.cells[slot + 1]];
+        if !cell.certain {
             return self.is_voted_inside(point);
         }
-        let [cell, next] = [self.cells[slot], self.cells[slot + 1]];
         let center = self.grid.global(self.grid.corner(cell.voxel as usize) + 0.5);
         let triangles = &self.triangles[cell.first as usize..next.first as usize];
         let crossed: i32 =
@@ -167,7 +167,7 @@ impl MeshVolume {
                     None => (),
                 }
             });
-            votes += i16::from(below != 0) + i16::from(above != 0);
+            votes += u8::from(below != 0) + u8::from(above != 0);
         }
         votes >= MAJORITY
     }
@@ -240,13 +240,21 @@ impl Tissue for MeshVolume {
     }
 }
 
-/// Sorts the pairs of voxel and triangle by voxel.
-fn cells(touched: &BitGrid, touches: &[(u32, u32)], windings: &[i16]) -> (Vec<Cell>, Vec<u32>) {
+/// Sorts the pairs of voxel and triangle by voxel. Where a triangle is `loose`, its voxels are not certain.
+fn cells(touched: &BitGrid, touches: &[(u32, u32)], findings: &[Finding], loose: &[bool]) -> (Vec<Cell>, Vec<u32>) {
     let mut cells: Vec<Cell> = touched
         .iter()
-        .map(|voxel| Cell { voxel: voxel as u32, first: 0, winding: windings[voxel] })
+        .map(|voxel| Cell {
+            voxel: voxel as u32,
+            first: 0,
+            winding: findings[voxel].winding,
+            certain: findings[voxel].is_unanimous(),
+        })
         .chain([Cell::default()])
         .collect();
+    for &(voxel, triangle) in touches {
+        cells[touched.rank(voxel as usize)].certain &= !loose[triangle as usize];
+    }
     // Counted one entry further on, so that the running sum gives each voxel's beginning.
     for &(voxel, _) in touches {
         cells[touched.rank(voxel as usize) + 1].first += 1;

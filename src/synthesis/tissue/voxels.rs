@@ -15,9 +15,32 @@ const PADDING: DVec3 = DVec3::new(0.31, 0.37, 0.43);
 /// What a triangle's surroundings are widened by against rounding, in voxels.
 const SLACK: f64 = 1.0e-6;
 /// Of six rays, how many must find a point enclosed.
-pub(super) const MAJORITY: i16 = 4;
+pub(super) const MAJORITY: u8 = 4;
 /// Most pairs of a triangle and a voxel that it touches.
 const MAX_TOUCHES: usize = 1 << 25;
+
+/// What the rays from a point say.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Finding {
+    /// How often the first ray finds the point enclosed.
+    pub winding: i16,
+    /// How many of six rays find it enclosed.
+    votes: u8,
+    /// How many of six rays find the same as the first.
+    agreeing: u8,
+}
+
+impl Finding {
+    /// Whether the point is inside.
+    pub fn is_inside(self) -> bool {
+        self.votes >= MAJORITY
+    }
+
+    /// Whether there is no doubt about the winding number.
+    pub fn is_unanimous(self) -> bool {
+        self.agreeing == 6
+    }
+}
 
 /// Cubic voxels over a box. A voxel's number counts along x first, then y, then z.
 #[derive(Clone, Debug)]
@@ -35,9 +58,10 @@ impl Grid {
     pub fn over(bounds: &Aabb3d, resolution: u32) -> Result<Self, TissueError> {
         let (min, max) = (Vec3::from(bounds.min).as_dvec3(), Vec3::from(bounds.max).as_dvec3());
         let cell = (max - min).max_element() / f64::from(resolution);
-        let size = ((max - min) / cell + PADDING).floor() + 1.0;
+        // So many that the last centre along each axis lies behind the mesh.
+        let size = ((max - min) / cell + PADDING + 0.5).floor() + 1.0;
         let voxels = size.element_product();
-        if !(voxels <= Self::MAX_VOXELS as f64) {
+        if voxels > Self::MAX_VOXELS as f64 {
             return Err(TissueError::TooManyVoxels { resolution, voxels });
         }
         Ok(Self { origin: min - PADDING * cell, cell, size: size.to_array().map(|count| count as usize) })
@@ -111,26 +135,28 @@ impl Grid {
         Ok(pairs)
     }
 
-    /// How often a closed mesh encloses the centre of every voxel.
-    pub fn windings(&self, mesh: &TriangleMesh) -> Vec<i16> {
-        let mut windings = vec![0i16; self.len()];
-        let steps = self.steps(mesh, 0);
-        self.walk_columns(0, &steps, |voxel, below, _| windings[voxel] = below);
-        windings
-    }
-
-    /// For an open mesh, 1 for every voxel whose centre most rays find enclosed, 0 for the others.
-    pub fn votes(&self, mesh: &TriangleMesh) -> Vec<i16> {
-        let mut votes = vec![0i16; self.len()];
-        for axis in 0..3 {
+    /// What rays from the centre of every voxel say: for a closed mesh one each, for an open one six.
+    pub fn findings(&self, mesh: &TriangleMesh, closed: bool) -> Vec<Finding> {
+        let mut findings = vec![Finding::default(); self.len()];
+        let axes = if closed { 1 } else { 3 };
+        for axis in 0..axes {
             let steps = self.steps(mesh, axis);
-            let vote = |voxel: usize, below, above| votes[voxel] += i16::from(below != 0) + i16::from(above != 0);
-            self.walk_columns(axis, &steps, vote);
+            self.walk_columns(axis, &steps, |voxel, below, above| {
+                let finding = &mut findings[voxel];
+                if axis == 0 {
+                    finding.winding = below;
+                }
+                for seen in [below, above] {
+                    finding.votes += u8::from(seen != 0);
+                    finding.agreeing += u8::from(seen == finding.winding);
+                }
+            });
         }
-        for vote in &mut votes {
-            *vote = i16::from(*vote >= MAJORITY);
+        for finding in &mut findings {
+            finding.votes *= 3 / axes as u8;
+            finding.agreeing *= 3 / axes as u8;
         }
-        votes
+        findings
     }
 
     /// Where the columns of voxel centres along an axis cross the mesh: at the first voxel behind each crossing the
@@ -160,7 +186,7 @@ impl Grid {
                 let behind = height.ceil().max(0.0) as usize;
                 let mut voxel = [0; 3];
                 (voxel[u], voxel[v], voxel[axis]) = (column_u, column_v, behind.min(self.size[axis] - 1));
-                // The padding leaves no crossing behind the last centre; rounding might.
+                // The grid reaches on behind the mesh; by rounding it might just not.
                 if behind < self.size[axis] {
                     let step = &mut steps[self.number(voxel)];
                     *step = step.saturating_sub(facing);
