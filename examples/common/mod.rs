@@ -2,11 +2,8 @@
 //! word about what is missing.
 
 pub mod headless;
-mod pictures;
-mod scene;
-
-pub use pictures::{HeadlessRun, SavePicture};
-pub use scene::Framing;
+pub mod pictures;
+pub mod scene;
 
 use bevy::{
     app::PluginGroupBuilder,
@@ -53,7 +50,7 @@ impl Show {
             Display::Offscreen => headless_plugins(true).add(OffscreenPlugin { size: self.size }),
             Display::None => headless_plugins(false),
         };
-        let run = HeadlessRun { frames_left: self.frames, picture: self.picture };
+        let run = pictures::HeadlessRun { frames_left: self.frames, picture: self.picture };
         plugins.add(pictures::PicturePlugin { display, run }).add(scene::ScenePlugin)
     }
 

@@ -30,9 +30,7 @@ pub struct SegmentExtension {
 
 impl SegmentExtension {
     fn shader() -> ShaderRef {
-        ShaderRef::Path(
-            bevy::asset::AssetPath::from_path_buf(embedded_path!("segments.wgsl")).with_source("embedded"),
-        )
+        ShaderRef::Path(bevy::asset::AssetPath::from_path_buf(embedded_path!("segments.wgsl")).with_source("embedded"))
     }
 }
 
