@@ -11,7 +11,7 @@ use bevy_vessels::synthesis::{
     io::{MeshReadError, read_mesh},
     preset::{Preset, PresetName},
     roots::RootPlacement,
-    tissue::{Ball, Cuboid, Disc, MeshSurface, MeshVolume, Tissue, TissueMode},
+    tissue::{Ball, Cuboid, Disc, Tissue, TissueMode},
 };
 use clap::{Parser, ValueEnum};
 use std::io::Write;
@@ -96,13 +96,18 @@ pub enum Mode {
     Surface,
     /// Through the volume.
     Volume,
+    /// Over the surface first, then inward through the volume.
+    Staged,
 }
 
 impl Mode {
-    fn tissue_mode(self) -> TissueMode {
-        match self {
-            Self::Surface => TissueMode::Surface,
-            Self::Volume => TissueMode::Volume,
+    /// The tissue's mode. Stages that the preset has stay as they are; otherwise half of all steps go to the surface.
+    fn tissue_mode(self, preset: TissueMode, steps: u32) -> TissueMode {
+        match (self, preset) {
+            (Self::Surface, _) => TissueMode::Surface,
+            (Self::Volume, _) => TissueMode::Volume,
+            (Self::Staged, TissueMode::Staged { .. }) => preset,
+            (Self::Staged, _) => TissueMode::Staged { surface_steps: steps / 2 },
         }
     }
 }
@@ -227,7 +232,9 @@ fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue
         }
         (Some(shape), None) => Ok(shape),
         (None, mode) => {
-            preset.tissue.mode = mode.map_or(preset.tissue.mode, Mode::tissue_mode);
+            if let Some(mode) = mode {
+                preset.tissue.mode = mode.tissue_mode(preset.tissue.mode, preset.settings.steps);
+            }
             let mesh = read_mesh(&options.tissue).map_err(|error| match error {
                 MeshReadError::UnknownFormat { path } => Failure::Usage(format!(
                     "--tissue is {}; it must be disc, ball, box, or a file that ends in .glb, .gltf or .obj",
@@ -235,10 +242,7 @@ fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue
                 )),
                 other => Failure::run(other),
             })?;
-            let built = match preset.tissue.mode {
-                TissueMode::Surface => MeshSurface::new(mesh).map(|surface| Arc::new(surface) as Arc<dyn Tissue>),
-                TissueMode::Volume => MeshVolume::new(&mesh, 128).map(|volume| Arc::new(volume) as Arc<dyn Tissue>),
-            };
+            let built = preset.tissue.build(&mesh);
             built.map_err(|error| Failure::Run(format!("{}: {error}", options.tissue.display())))
         }
     }

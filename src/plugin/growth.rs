@@ -71,7 +71,6 @@ pub(crate) fn grow(
     mut frame: ResMut<GrowthFrame>,
     mut last: Local<Option<Entity>>,
     mut organs: Query<(Entity, &GrowthControl, &mut GrowthState, &mut GrowthProgress)>,
-    mut finished: MessageWriter<GrowthFinished>,
 ) {
     let start = Instant::now();
     let mut steps = 0;
@@ -93,8 +92,15 @@ pub(crate) fn grow(
         },
     );
     *frame = GrowthFrame { steps, time: start.elapsed() };
-    for (organ, _, state, mut progress) in &mut organs {
-        if progress.phase == GrowthPhase::Growing && is_done(&state) {
+}
+
+/// Says which growths have done all their steps.
+pub(crate) fn end_growths(
+    mut organs: Query<(Entity, &GrowthState, &mut GrowthProgress)>,
+    mut finished: MessageWriter<GrowthFinished>,
+) {
+    for (organ, state, mut progress) in &mut organs {
+        if progress.phase == GrowthPhase::Growing && is_done(state) {
             progress.phase = GrowthPhase::Finished;
             finished.write(GrowthFinished { organ });
         }

@@ -18,6 +18,7 @@ mod growth;
 mod growth_state;
 mod messages;
 mod organ_mesh;
+mod procedural;
 mod publish;
 mod segment_changes;
 mod tissue_source;
@@ -110,7 +111,7 @@ impl Plugin for GrowthPlugin {
                 )
                     .chain()
                     .in_set(VesselSystems::Source),
-                growth::grow.in_set(VesselSystems::Grow),
+                (growth::grow, growth::end_growths).chain().in_set(VesselSystems::Grow),
                 (publish::publish_vessels, publish::show_systems, diagnostics::measure)
                     .chain()
                     .in_set(VesselSystems::Publish),

@@ -116,12 +116,7 @@ fn mesh_news(event: &AssetEvent<Mesh>) -> Option<(AssetId<Mesh>, bool)> {
 /// The slow part of the preparation, as a pure function of what was copied from the mesh.
 fn prepare(copy: MeshCopy, settings: &TissueSettings) -> Prepared {
     let mesh = TriangleMesh::new(copy.positions, copy.triangles, None).map_err(OrganMeshError::from)?;
-    Ok(match settings.mode {
-        crate::synthesis::tissue::TissueMode::Surface => Arc::new(crate::synthesis::tissue::MeshSurface::new(mesh)?),
-        crate::synthesis::tissue::TissueMode::Volume => {
-            Arc::new(crate::synthesis::tissue::MeshVolume::new(&mesh, 128)?)
-        }
-    })
+    Ok(settings.build(&mesh)?)
 }
 
 impl OrganMeshes<'_> {

@@ -56,7 +56,7 @@ mod tests {
 
     /// Exponent, r_daughter / r_parent, angle between daughters in degrees: published values for equal daughters.
     const SYMMETRIC: [(f32, f32, f32); 6] = [
-        (2.0, 0.7071, 0.0),
+        (2.0, std::f32::consts::FRAC_1_SQRT_2, 0.0),
         (2.35, 0.7446, 51.2),
         (2.59, 0.7652, 62.7),
         (2.7, 0.7736, 66.7),

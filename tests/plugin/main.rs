@@ -2,6 +2,7 @@
 
 mod budget;
 mod changes;
+mod desktop;
 mod entities;
 mod errors;
 mod growth;
@@ -31,7 +32,13 @@ const STEPS: u32 = 30;
 fn headless(budget: GrowthBudget) -> App {
     let mut app = App::new();
     let growth = GrowthPlugin::default().with_budget(budget);
-    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, VesselPlugin { growth, ..default() }));
+    app.add_plugins((
+        MinimalPlugins,
+        AssetPlugin::default(),
+        MeshPlugin,
+        TransformPlugin,
+        VesselPlugin { growth, ..default() },
+    ));
     app.finish();
     app.cleanup();
     app

@@ -111,7 +111,8 @@ pub struct SystemSettings {
     /// How many vessels may leave a root.
     ///
     /// With 1, as in the paper, a root inside the tissue whose only vessel runs to a near edge can never reach what lies
-    /// behind it: on a disc about 2 % of random roots then supply next to nothing, with 2 none of 400.
+    /// behind it: on a disc about 2 % of random roots then supply next to nothing, with 2 none of 400. Narrow organs need
+    /// more.
     ///
     /// Limits: ≥ 1. Default: [`Self::DEFAULT_ROOT_CHILDREN`].
     pub root_children: u32,
@@ -139,12 +140,12 @@ impl SystemSettings {
     /// κ of the paper.
     pub const DEFAULT_BIFURCATION_EXPONENT: f32 = 2.55;
     /// Vessels that may leave a root.
-    pub const DEFAULT_ROOT_CHILDREN: u32 = 2;
+    pub const DEFAULT_ROOT_CHILDREN: u32 = 4;
     /// Venous influence distance, as a multiple of the arterial one, that keeps the venous tree from stalling.
     ///
     /// The drains handed over lie where the arteries were, which the veins reach only from further away. At 1 most venous
-    /// trees stall, at 1.5 some of a hundred do, at 2 none.
-    pub const DEFAULT_VENOUS_INFLUENCE_FACTOR: f32 = 2.0;
+    /// trees stall on a disc, at 1.5 some of a hundred do, at 2 some on narrow organs.
+    pub const DEFAULT_VENOUS_INFLUENCE_FACTOR: f32 = 2.5;
 
     /// Multiplies every length by `factor`. Angles, weights and exponents stay.
     pub fn scale_lengths(&mut self, factor: f32) {
@@ -245,12 +246,18 @@ impl ColonizationSettings {
         self
     }
 
-    /// Fits settings made for a tissue of equivalent diameter 1, as all presets are, to a tissue of any size.
+    /// Lengths in a volume as a multiple of those on a surface of the same equivalent diameter: the paper's ball against
+    /// its disc. The same samples have more to fill there.
+    pub const VOLUME_FACTOR: f32 = 1.5;
+
+    /// Fits settings made for a surface of equivalent diameter 1, as all presets are, to a tissue of any size; in a volume
+    /// lengths come out [`VOLUME_FACTOR`](Self::VOLUME_FACTOR) times as long.
     ///
     /// A 0.3 m organ and the same organ of 300 mm then grow the same vessels.
     #[must_use]
     pub fn fit(self, extent: Extent) -> Self {
-        self.scaled(extent.equivalent_diameter())
+        let factor = if let Extent::Volume(_) = extent { Self::VOLUME_FACTOR } else { 1.0 };
+        self.scaled(extent.equivalent_diameter() * factor)
     }
 }
 

@@ -155,6 +155,23 @@ impl MeshTopology {
         self.boundary_edges() == 0
     }
 
+    /// Which triangles have an edge that is run along more often one way than the other. `flip` says which triangles count
+    /// as reversed.
+    ///
+    /// Where there is none, every point is enclosed a whole number of times, from whichever side one looks.
+    pub fn unbalanced(&self, flip: impl Fn(usize) -> bool) -> Vec<bool> {
+        let mut unbalanced = vec![false; self.triangles.len()];
+        for fan in self.fans() {
+            let forward = fan.iter().filter(|edge| edge.forward != flip(edge.triangle as usize)).count();
+            if 2 * forward != fan.len() {
+                for edge in fan {
+                    unbalanced[edge.triangle as usize] = true;
+                }
+            }
+        }
+        unbalanced
+    }
+
     /// Vertices − edges + triangles, over what non-degenerate triangles use: 2 for a ball, 0 for a torus.
     pub fn euler_characteristic(&self) -> i64 {
         let mut used = vec![false; self.welding.count()];

@@ -4,7 +4,7 @@
 //! "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007) into one flat array in depth-first order, and
 //! asked without allocating.
 
-use bevy_math::Vec3;
+use bevy_math::{BVec3A, Vec3, Vec3A};
 
 /// Candidate planes per split, plus one.
 const BINS: usize = 16;
@@ -19,37 +19,37 @@ const STACK: usize = 96;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Lowest corner.
-    pub min: Vec3,
+    pub min: Vec3A,
     /// Highest corner.
-    pub max: Vec3,
+    pub max: Vec3A,
 }
 
 impl Bounds {
     /// A box around nothing, which any point enlarges.
-    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+    pub const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
 
     /// The smallest box around some points.
     pub fn around(points: &[Vec3]) -> Self {
-        points.iter().fold(Self::EMPTY, |bounds, &point| bounds.with_point(point))
+        points.iter().fold(Self::EMPTY, |bounds, &point| bounds.with_point(point.into()))
     }
 
-    fn with_point(self, point: Vec3) -> Self {
+    fn with_point(self, point: Vec3A) -> Self {
         Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
-    fn with(self, other: Self) -> Self {
+    pub(super) fn with(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// Half the surface area; 0 for an empty box.
     fn half_area(self) -> f32 {
-        let size = (self.max - self.min).max(Vec3::ZERO);
+        let size = (self.max - self.min).max(Vec3A::ZERO);
         size.x * size.y + size.y * size.z + size.z * size.x
     }
 
     /// Squared distance to a point, 0 inside.
-    fn distance_squared(&self, point: Vec3) -> f32 {
-        let outside = (self.min - point).max(point - self.max).max(Vec3::ZERO);
+    fn distance_squared(&self, point: Vec3A) -> f32 {
+        let outside = (self.min - point).max(point - self.max).max(Vec3A::ZERO);
         outside.length_squared()
     }
 
@@ -59,11 +59,12 @@ impl Bounds {
     }
 
     /// Where a line enters the box, at or after 0, if it does so before `limit`. `inverse` is 1 / direction.
-    fn entry(&self, from: Vec3, inverse: Vec3, limit: f32) -> Option<f32> {
+    fn entry(&self, from: Vec3A, inverse: Vec3A, limit: f32) -> Option<f32> {
         let (a, b) = ((self.min - from) * inverse, (self.max - from) * inverse);
-        // A line within a face gives 0 · ∞ = NaN, which min and max of glam pass over only on one side: count it as in.
-        let near = Vec3::select(a.is_nan_mask() | b.is_nan_mask(), Vec3::NEG_INFINITY, a.min(b));
-        let far = Vec3::select(a.is_nan_mask() | b.is_nan_mask(), Vec3::INFINITY, a.max(b));
+        // A line within a face gives 0 · ∞, not a number: count it as in.
+        let within: BVec3A = a.is_nan_mask() | b.is_nan_mask();
+        let near = Vec3A::select(within, Vec3A::NEG_INFINITY, a.min(b));
+        let far = Vec3A::select(within, Vec3A::INFINITY, a.max(b));
         let (enter, leave) = (near.max_element().max(0.0), far.min_element());
         (enter <= leave && enter <= limit).then_some(enter)
     }
@@ -93,11 +94,13 @@ pub struct BoxTree {
 struct Item {
     bounds: Bounds,
     id: u32,
+    /// Where it falls in the split under way.
+    bin: u32,
 }
 
 impl Item {
     /// Twice the centre.
-    fn centre(&self) -> Vec3 {
+    fn centre(&self) -> Vec3A {
         self.bounds.min + self.bounds.max
     }
 }
@@ -106,7 +109,7 @@ impl BoxTree {
     /// Builds the tree over boxes, which may overlap, be flat or coincide.
     pub fn new(boxes: impl IntoIterator<Item = Bounds>) -> Self {
         let mut items: Vec<Item> =
-            boxes.into_iter().enumerate().map(|(id, bounds)| Item { bounds, id: id as u32 }).collect();
+            boxes.into_iter().enumerate().map(|(id, bounds)| Item { bounds, id: id as u32, bin: 0 }).collect();
         let mut nodes: Vec<Node> = Vec::with_capacity(items.len());
         // Ranges still to be made into nodes, with the node whose second child they are.
         let mut pending = Vec::new();
@@ -119,13 +122,17 @@ impl BoxTree {
                 nodes[parent].link = index as u32;
             }
             let range = &mut items[start..end];
-            let bounds = range.iter().fold(Bounds::EMPTY, |bounds, item| bounds.with(item.bounds));
+            let (mut bounds, mut centres) = (Bounds::EMPTY, Bounds::EMPTY);
+            for item in range.iter() {
+                bounds = bounds.with(item.bounds);
+                centres = centres.with_point(item.centre());
+            }
             if range.len() <= LEAF {
                 nodes.push(Node { bounds, link: start as u32, count: range.len() as u32 });
                 continue;
             }
             nodes.push(Node { bounds, link: 0, count: 0 });
-            let middle = start + split(range, depth);
+            let middle = start + split(range, &centres, depth);
             pending.push((middle, end, Some(index), depth + 1));
             pending.push((start, middle, None, depth + 1));
         }
@@ -142,6 +149,7 @@ impl BoxTree {
     /// `visit(slot, best)` measures what is in the box and returns the squared distance of the best so far. The search
     /// begins with `limit`. A box exactly as far as the best is still visited, so that ties can be broken by the caller.
     pub fn nearest(&self, point: Vec3, limit: f32, mut visit: impl FnMut(usize, f32) -> f32) {
+        let point = Vec3A::from(point);
         let mut best = limit;
         let mut stack = [(0u32, 0f32); STACK];
         let mut depth = 0;
@@ -177,15 +185,16 @@ impl BoxTree {
     }
 
     /// Visits every box that has a point in common with `region`, until `visit` returns false.
-    pub fn overlapping(&self, region: &Bounds, mut visit: impl FnMut(usize) -> bool) {
-        self.walk(|bounds| bounds.overlaps(region), |slot| visit(slot));
+    pub fn overlapping(&self, region: &Bounds, visit: impl FnMut(usize) -> bool) {
+        self.walk(|bounds| bounds.overlaps(region), visit);
     }
 
     /// Visits boxes along the segment between two points, as long as they can be met before what was found.
     ///
     /// `visit(slot, limit)` returns the share of the segment, 0 to 1, up to which the search goes on.
     pub fn along(&self, from: Vec3, to: Vec3, mut visit: impl FnMut(usize, f32) -> f32) {
-        let inverse = (to - from).recip();
+        let from = Vec3A::from(from);
+        let inverse = (Vec3A::from(to) - from).recip();
         let limit = std::cell::Cell::new(1.0);
         self.walk(
             |bounds| bounds.entry(from, inverse, limit.get()).is_some(),
@@ -222,29 +231,30 @@ impl BoxTree {
     }
 }
 
-/// Sorts items to two sides of a plane and says how many are on the first: at least one, and not all.
-fn split(items: &mut [Item], depth: u32) -> usize {
-    let centres = items.iter().fold(Bounds::EMPTY, |bounds, item| bounds.with_point(item.centre()));
+/// Sorts items to two sides of a plane and says how many are on the first: at least one, and not all. `centres` bounds
+/// their centres, doubled.
+fn split(items: &mut [Item], centres: &Bounds, depth: u32) -> usize {
     let size = centres.max - centres.min;
     let axis = size.max_position();
     let half = items.len() / 2;
     // Centres that coincide can only be told apart by number; so can those of degenerate extents.
-    if depth >= DEEP || !(size[axis] > 0.0) {
+    let apart = size[axis] > 0.0;
+    if depth >= DEEP || !apart {
         items.select_nth_unstable_by(half, |a, b| a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.id.cmp(&b.id)));
         return half;
     }
     let scale = BINS as f32 / size[axis];
-    let bin = |item: &Item| (((item.centre()[axis] - centres.min[axis]) * scale) as usize).min(BINS - 1);
     let mut bins = [(Bounds::EMPTY, 0u32); BINS];
-    for item in items.iter() {
-        let (bounds, count) = &mut bins[bin(item)];
+    for item in items.iter_mut() {
+        item.bin = (((item.centre()[axis] - centres.min[axis]) * scale) as u32).min(BINS as u32 - 1);
+        let (bounds, count) = &mut bins[item.bin as usize];
         *bounds = bounds.with(item.bounds);
         *count += 1;
     }
     let plane = cheapest_plane(&bins);
     let mut middle = 0;
     for i in 0..items.len() {
-        if bin(&items[i]) < plane {
+        if items[i].bin < plane {
             items.swap(i, middle);
             middle += 1;
         }
@@ -254,7 +264,7 @@ fn split(items: &mut [Item], depth: u32) -> usize {
 }
 
 /// The bin before which to split so that area times number, over both sides, is least.
-fn cheapest_plane(bins: &[(Bounds, u32); BINS]) -> usize {
+fn cheapest_plane(bins: &[(Bounds, u32); BINS]) -> u32 {
     let mut left = [0.0; BINS];
     let (mut bounds, mut count) = (Bounds::EMPTY, 0);
     for plane in 1..BINS {
@@ -272,5 +282,5 @@ fn cheapest_plane(bins: &[(Bounds, u32); BINS]) -> usize {
             best = (cost, plane);
         }
     }
-    best.1
+    best.1 as u32
 }

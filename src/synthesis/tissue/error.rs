@@ -49,6 +49,61 @@ pub enum TissueError {
         /// Voxels along the longest side.
         resolution: u32,
     },
+    /// A length that must not be below zero.
+    #[error("{what} is {value}; it must be at least 0")]
+    Negative {
+        /// Which length.
+        what: &'static str,
+        /// The value found.
+        value: f32,
+    },
+    /// A mask with another number of cells than its size says, or too many.
+    #[error("the mask has {cells} cells for a size of {size:?}; give one for each, at most {limit}")]
+    MaskSize {
+        /// Cells along each axis.
+        size: [usize; 3],
+        /// Cells found.
+        cells: usize,
+        /// The largest number.
+        limit: usize,
+    },
+    /// A mask in which no cell is set.
+    #[error("no cell of the mask is set; lower its threshold")]
+    EmptyMask,
+    /// A guide of too few or too many points.
+    #[error("a guide has {points} points; it needs 2 to {limit}")]
+    GuidePoints {
+        /// Number of points.
+        points: usize,
+        /// The largest number.
+        limit: usize,
+    },
+    /// A guide without length.
+    #[error("a guide is {length} long; its points must not all coincide, on the tissue it is laid on neither")]
+    GuideLength {
+        /// Its length.
+        length: f32,
+    },
+    /// Values of a density field that are not one for each vertex or grid point.
+    #[error("the density field has {values} values; it needs {expected}, one for each vertex or grid point")]
+    DensityCount {
+        /// Number of values.
+        values: usize,
+        /// Number of vertices or grid points.
+        expected: usize,
+    },
+    /// A value of a density field that is NaN.
+    #[error("value {index} of the density field is not a number; it must be 0 to 1")]
+    DensityNotANumber {
+        /// Which value.
+        index: usize,
+    },
+    /// A density field over a tissue that changes in stages.
+    #[error("a density field cannot be put over a staged tissue; put it over its stages")]
+    DensityOverStages,
+    /// A staged tissue as the stage of another.
+    #[error("a stage of a staged tissue cannot be staged itself; list its stages instead")]
+    StagesWithinStages,
     /// Sides of a rectangle that are not perpendicular.
     #[error("the sides of the rectangle meet at an angle with cosine {cosine}; they must be perpendicular")]
     NotPerpendicular {

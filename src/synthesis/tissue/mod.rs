@@ -17,20 +17,28 @@
 //! [`settings`] describes the tissue of an organ as data, and builds it from the organ's mesh.
 
 pub mod bvh;
+pub mod density;
 mod error;
 pub mod growth;
+pub mod mask;
 mod orientation;
+pub mod path;
 pub mod settings;
 pub mod shape;
+pub mod staged;
 pub mod surface;
 pub mod triangle;
 pub mod volume;
 mod voxels;
 
+pub use density::{DensityField, DensityTissue};
 pub use error::TissueError;
 pub use growth::TissueGrowth;
-pub use settings::{TissueMode, TissueSettings};
+pub use mask::Mask;
+pub use path::GuidePath;
+pub use settings::{Guide, TissueMode, TissueSettings};
 pub use shape::{Ball, Cuboid, Disc, Ellipsoid, Rectangle};
+pub use staged::Staged;
 pub use surface::MeshSurface;
 pub use triangle::{SurfacePoint, TriangleIndex};
 pub use volume::MeshVolume;

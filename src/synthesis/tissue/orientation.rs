@@ -9,7 +9,9 @@ const PROBES: usize = 9;
 
 /// Turns triangles that face the other way than those around them, and closed shells that face the other way than the
 /// largest, unless they are cavities in it. `index` is that of the mesh.
-pub(super) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> TriangleMesh {
+///
+/// Also tells of which triangles the neighbours are missing or out of order: of none if the result is closed.
+pub(super) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> (TriangleMesh, Vec<bool>) {
     let topology = mesh.topology();
     let misoriented = topology.misoriented(&mesh);
     let mesh = mesh.with_flipped(|triangle| misoriented[triangle]);
@@ -19,8 +21,10 @@ pub(super) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> TriangleMes
         volumes.iter().fold(0.0f64, |largest, volume| if volume.abs() > largest.abs() { *volume } else { largest });
     let against: Vec<bool> =
         volumes.iter().zip(closed).map(|(volume, closed)| closed && volume * largest < 0.0).collect();
+    let loose =
+        |turned: &dyn Fn(usize) -> bool| topology.unbalanced(|triangle| misoriented[triangle] != turned(triangle));
     if !against.contains(&true) {
-        return mesh;
+        return (mesh, loose(&|_| false));
     }
     let mut members = vec![Vec::new(); patches.count];
     for (triangle, patch) in patches.of_triangle.iter().enumerate() {
@@ -36,7 +40,9 @@ pub(super) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> TriangleMes
             against[patch] && !probes.all(|probe| is_enclosed(probe, &mesh, index, facing_right))
         })
         .collect();
-    mesh.with_flipped(|triangle| patches.of_triangle[triangle].is_some_and(|patch| flip[patch as usize]))
+    let turned = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| flip[patch as usize]);
+    let loose = loose(&turned);
+    (mesh.with_flipped(turned), loose)
 }
 
 /// Signed volume of every part of the surface.
@@ -53,7 +59,7 @@ fn shell_volumes(mesh: &TriangleMesh, patches: &Patches) -> Vec<f64> {
 
 /// Whether the triangles that `counts` lets through wind around a point, seen along z.
 fn is_enclosed(point: Vec3, mesh: &TriangleMesh, index: &TriangleIndex, counts: impl Fn(usize) -> bool) -> bool {
-    let region = Bounds { min: point, max: point.with_z(f32::INFINITY) };
+    let region = Bounds { min: point.into(), max: point.with_z(f32::INFINITY).into() };
     let mut winding = 0;
     index.overlapping(&region, |_, triangle| {
         // The mesh's own corners: it was reoriented after it was indexed.

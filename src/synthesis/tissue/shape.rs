@@ -156,7 +156,7 @@ impl Rectangle {
         )?;
         let (axis_x, axis_y) = (half_x / x, half_y / y);
         let cosine = axis_x.dot(axis_y);
-        if !(cosine.abs() <= PERPENDICULAR) {
+        if cosine.abs() > PERPENDICULAR {
             return Err(TissueError::NotPerpendicular { cosine });
         }
         Ok(Self { center, axes: [axis_x, (axis_y - axis_x * cosine).normalize()], half: Vec2::new(x, y) })
@@ -364,8 +364,9 @@ fn nearest_on_ellipsoid(point: DVec3, half: DVec3) -> DVec3 {
         let value = ratios.length_squared() - 1.0;
         let slope = -2.0 * (ratios * ratios / (squares + t)).element_sum();
         let next = t - value / slope;
-        // Also where the slope is 0 and `next` no number.
-        if !(next > t) {
+        // `next` is no number where the slope is 0: then nothing is gained either.
+        let gains = next > t;
+        if !gains {
             break;
         }
         t = next;

@@ -132,7 +132,7 @@ impl Tissue for MeshSurface {
 /// Vose's table for drawing an index with a probability in proportion to its weight. Empty where no weight is above 0.
 fn alias_table(weights: &[f64]) -> Vec<Pick> {
     let total: f64 = weights.iter().sum();
-    if !(total > 0.0) {
+    if total <= 0.0 {
         return Vec::new();
     }
     let mut shares: Vec<f64> = weights.iter().map(|weight| weight / total * weights.len() as f64).collect();

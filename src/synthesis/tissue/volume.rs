@@ -1,20 +1,27 @@
 //! The inside of an organ's mesh as a tissue.
 //!
-//! The mesh is voxelised once. Voxels that its surface does not touch are inside or outside as a whole; in the others a
-//! point is compared with the voxel's centre: it is on the same side if the triangles between them cancel out. So the
-//! boundary is that of the mesh and not that of the voxels. What is inside is decided by winding numbers, which forgive
-//! duplicated vertices, small holes, overlapping and nested shells and triangles that face the wrong way.
+//! The mesh is voxelised once. Voxels that its surface does not touch are inside or outside as a whole. In the others the
+//! mesh itself is asked: a point is on the same side as the voxel's centre if the triangles between them cancel out; where an
+//! open mesh leaves doubt about the centre, six rays from the point vote. So the boundary is that of the mesh and not that of the voxels.
+//!
+//! Inside is what the mesh winds around. That forgives duplicated vertices, small holes, overlapping and nested shells and
+//! triangles that face the wrong way.
 
 use super::{
     Extent, Tissue, TissuePoint,
+    bvh::Bounds,
     error::TissueError,
     orientation::oriented,
     triangle::TriangleIndex,
-    voxels::{BitGrid, Grid},
+    voxels::{BitGrid, Finding, Grid, MAJORITY, crossing},
 };
 use crate::synthesis::{mesh::TriangleMesh, rng::VesselRng};
-use bevy_math::{DVec3, Vec3, bounding::Aabb3d};
+use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
 use rand::RngExt;
+
+/// Steps whose multiples fill the unit cube evenly: powers of 1/g, where g⁴ = g + 1 (Roberts, "The Unreasonable
+/// Effectiveness of Quasirandom Sequences", 2018).
+const EVEN_STEPS: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
 
 /// What a mesh encloses.
 #[derive(Clone, Debug)]
@@ -23,6 +30,8 @@ pub struct MeshVolume {
     index: TriangleIndex,
     bounds: Aabb3d,
     volume: f32,
+    /// Whether the mesh is closed.
+    closed: bool,
     /// Corners of every triangle.
     corners: Vec<[Vec3; 3]>,
     /// Voxels that are inside as a whole.
@@ -43,14 +52,18 @@ struct Cell {
     voxel: u32,
     /// Its first triangle.
     first: u32,
-    /// Winding number of its centre.
+    /// How often its centre is enclosed.
     winding: i16,
+    /// Whether that is certain, so that points of the voxel can be compared with it.
+    certain: bool,
 }
 
 impl MeshVolume {
     /// Voxels along the longest side of the mesh's box, if nothing else is asked for.
     pub const DEFAULT_RESOLUTION: u32 = 128;
 
+    /// Points of the touched voxels by which the volume is measured.
+    const PROBES: usize = 1 << 16;
     /// Most draws for a sample. Of the voxels that are drawn from, more than a tenth of the space is inside.
     const TRIES: u32 = 128;
     /// How far a point that is brought in comes to lie inside, in voxels: the first of these that is inside.
@@ -71,18 +84,20 @@ impl MeshVolume {
         let grid = Grid::over(&mesh.bounds(), resolution)?;
         let mesh = mesh.welded();
         let index = TriangleIndex::new(&mesh);
-        let mesh = oriented(mesh, &index);
+        let (mesh, loose) = oriented(mesh, &index);
+        let closed = !loose.contains(&true);
         let touches = grid.touches(&mesh)?;
-        let windings = grid.windings(&mesh);
+        let findings = grid.findings(&mesh, closed);
         let touched = BitGrid::new(grid.len(), touches.iter().map(|&(voxel, _)| voxel as usize));
-        let enclosed = |voxel: &usize| windings[*voxel] != 0 && !touched.contains(*voxel);
+        let enclosed = |voxel: &usize| findings[*voxel].is_inside() && !touched.contains(*voxel);
         let inside = BitGrid::new(grid.len(), (0..grid.len()).filter(enclosed));
-        let (cells, triangles) = cells(&touched, &touches, &windings);
+        let (cells, triangles) = cells(&touched, &touches, &findings, &loose);
         let mut volume = Self {
             whole: inside.iter().map(|voxel| voxel as u32).collect(),
             corners: (0..mesh.triangles().len()).map(|triangle| mesh.corners(triangle)).collect(),
             bounds: mesh.bounds(),
             volume: 0.0,
+            closed,
             grid,
             index,
             inside,
@@ -111,30 +126,50 @@ impl MeshVolume {
 
     /// Volume: whole voxels, and touched ones by the share of their points that are inside.
     fn measure(&self) -> f32 {
-        // In a thick organ the centres say enough. A thin one lies between them.
-        let thin = self.whole.len() < self.touched_voxels();
-        let inside = |slot: usize| {
-            if !thin {
-                return f64::from(u8::from(self.cells[slot].winding != 0));
-            }
+        let inside = |probe: &usize| {
+            let slot = probe * self.touched_voxels() / Self::PROBES;
             let corner = self.grid.corner(self.cells[slot].voxel as usize);
-            let eighth = |part: u8| DVec3::new((part & 1).into(), (part >> 1 & 1).into(), (part >> 2).into());
-            let points = (0..8).map(|part| self.grid.global(corner + 0.25 + 0.5 * eighth(part)));
-            points.filter(|&point| self.is_inside(slot, point)).count() as f64 / 8.0
+            self.is_inside(slot, self.grid.global(corner + (EVEN_STEPS * (*probe as f64)).fract()))
         };
-        let touched: f64 = (0..self.touched_voxels()).map(inside).sum();
+        let share = (0..Self::PROBES).filter(inside).count() as f64 / Self::PROBES as f64;
         let cell = self.grid.cell();
-        ((self.whole.len() as f64 + touched) * cell * cell * cell) as f32
+        ((self.whole.len() as f64 + share * self.touched_voxels() as f64) * cell * cell * cell) as f32
     }
 
     /// Whether a point is inside, in a voxel that the surface touches.
     fn is_inside(&self, slot: usize, point: Vec3) -> bool {
         let [cell, next] = [self.cells[slot], self.cells[slot + 1]];
+        if !cell.certain {
+            return self.is_voted_inside(point);
+        }
         let center = self.grid.global(self.grid.corner(cell.voxel as usize) + 0.5);
         let triangles = &self.triangles[cell.first as usize..next.first as usize];
         let crossed: i32 =
             triangles.iter().map(|&triangle| winding_step(center, point, self.corners[triangle as usize])).sum();
         i32::from(cell.winding) + crossed != 0
+    }
+
+    /// Whether most of six rays along the axes find a point enclosed.
+    fn is_voted_inside(&self, point: Vec3) -> bool {
+        let mut votes = 0;
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let (mut min, mut max) = (point, point);
+            (min[axis], max[axis]) = (f32::NEG_INFINITY, f32::INFINITY);
+            let flat = |point: Vec3| DVec2::new(point[u].into(), point[v].into());
+            let (mut below, mut above) = (0, 0);
+            self.index.overlapping(&Bounds { min: min.into(), max: max.into() }, |_, triangle| {
+                let corners = self.corners[triangle];
+                let heights = corners.map(|corner| f64::from(corner[axis]));
+                match crossing(flat(point), corners.map(flat), heights) {
+                    Some((facing, height)) if height > f64::from(point[axis]) => above += i32::from(facing),
+                    Some((facing, _)) => below += i32::from(facing),
+                    None => (),
+                }
+            });
+            votes += u8::from(below != 0) + u8::from(above != 0);
+        }
+        votes >= MAJORITY
     }
 
     /// Brings a point outside to the nearest point a little inside.
@@ -170,6 +205,11 @@ impl Tissue for MeshVolume {
     }
 
     fn contains(&self, point: Vec3) -> bool {
+        // In a hole of an open mesh a voxel may be inside as a whole that reaches out of the mesh's box.
+        let [min, max] = [self.bounds.min, self.bounds.max].map(Vec3::from);
+        if !(point.cmpge(min).all() && point.cmple(max).all()) {
+            return false;
+        }
         let Some(voxel) = self.grid.voxel(self.grid.local(point)) else { return false };
         if self.touched.contains(voxel) {
             return self.is_inside(self.touched.rank(voxel), point);
@@ -192,7 +232,7 @@ impl Tissue for MeshVolume {
             };
             let within = DVec3::new(rng.random(), rng.random(), rng.random());
             let point = self.grid.global(self.grid.corner(voxel as usize) + within);
-            if pick < self.whole.len() || self.contains(point) {
+            if self.closed && pick < self.whole.len() || self.contains(point) {
                 return Some(point);
             }
         }
@@ -200,13 +240,21 @@ impl Tissue for MeshVolume {
     }
 }
 
-/// Sorts the pairs of voxel and triangle by voxel.
-fn cells(touched: &BitGrid, touches: &[(u32, u32)], windings: &[i16]) -> (Vec<Cell>, Vec<u32>) {
+/// Sorts the pairs of voxel and triangle by voxel. Where a triangle is `loose`, its voxels are not certain.
+fn cells(touched: &BitGrid, touches: &[(u32, u32)], findings: &[Finding], loose: &[bool]) -> (Vec<Cell>, Vec<u32>) {
     let mut cells: Vec<Cell> = touched
         .iter()
-        .map(|voxel| Cell { voxel: voxel as u32, first: 0, winding: windings[voxel] })
+        .map(|voxel| Cell {
+            voxel: voxel as u32,
+            first: 0,
+            winding: findings[voxel].winding,
+            certain: findings[voxel].is_unanimous(),
+        })
         .chain([Cell::default()])
         .collect();
+    for &(voxel, triangle) in touches {
+        cells[touched.rank(voxel as usize)].certain &= !loose[triangle as usize];
+    }
     // Counted one entry further on, so that the running sum gives each voxel's beginning.
     for &(voxel, _) in touches {
         cells[touched.rank(voxel as usize) + 1].first += 1;

@@ -1,10 +1,9 @@
-//! A voxel grid over a closed or nearly closed mesh: which voxels its surface touches, and how often each voxel's centre
-//! is enclosed.
+//! A voxel grid over a mesh: which voxels its surface touches, and which voxel centres it encloses.
 //!
-//! A voxel's winding number is the mean over six rays from its centre, along the axes both ways, of the signed number of
-//! triangles they cross. For a closed mesh all six agree, whatever shells it consists of. Where some rays leave through a
-//! hole, the others outvote them: it is the generalised winding number (Jacobson, Kavan & Sorkine-Hornung, "Robust
-//! Inside-Outside Segmentation using Generalized Winding Numbers", 2013) from six directions.
+//! A closed mesh encloses every point a whole number of times, which a single ray tells: each triangle that it crosses
+//! counts up or down, whatever shells the mesh consists of. Where a mesh is open, rays disagree. Then six vote, along the
+//! axes both ways, and four must find a point enclosed: a sample of the generalised winding number (Jacobson, Kavan &
+//! Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers", 2013).
 
 use super::error::TissueError;
 use crate::synthesis::mesh::TriangleMesh;
@@ -15,8 +14,33 @@ use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
 const PADDING: DVec3 = DVec3::new(0.31, 0.37, 0.43);
 /// What a triangle's surroundings are widened by against rounding, in voxels.
 const SLACK: f64 = 1.0e-6;
+/// Of six rays, how many must find a point enclosed.
+pub(super) const MAJORITY: u8 = 4;
 /// Most pairs of a triangle and a voxel that it touches.
 const MAX_TOUCHES: usize = 1 << 25;
+
+/// What the rays from a point say.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Finding {
+    /// How often the first ray finds the point enclosed.
+    pub winding: i16,
+    /// How many of six rays find it enclosed.
+    votes: u8,
+    /// How many of six rays find the same as the first.
+    agreeing: u8,
+}
+
+impl Finding {
+    /// Whether the point is inside.
+    pub fn is_inside(self) -> bool {
+        self.votes >= MAJORITY
+    }
+
+    /// Whether there is no doubt about the winding number.
+    pub fn is_unanimous(self) -> bool {
+        self.agreeing == 6
+    }
+}
 
 /// Cubic voxels over a box. A voxel's number counts along x first, then y, then z.
 #[derive(Clone, Debug)]
@@ -34,9 +58,10 @@ impl Grid {
     pub fn over(bounds: &Aabb3d, resolution: u32) -> Result<Self, TissueError> {
         let (min, max) = (Vec3::from(bounds.min).as_dvec3(), Vec3::from(bounds.max).as_dvec3());
         let cell = (max - min).max_element() / f64::from(resolution);
-        let size = ((max - min) / cell + PADDING).floor() + 1.0;
+        // So many that the last centre along each axis lies behind the mesh.
+        let size = ((max - min) / cell + PADDING + 0.5).floor() + 1.0;
         let voxels = size.element_product();
-        if !(voxels <= Self::MAX_VOXELS as f64) {
+        if voxels > Self::MAX_VOXELS as f64 {
             return Err(TissueError::TooManyVoxels { resolution, voxels });
         }
         Ok(Self { origin: min - PADDING * cell, cell, size: size.to_array().map(|count| count as usize) })
@@ -110,26 +135,41 @@ impl Grid {
         Ok(pairs)
     }
 
-    /// Winding number of every voxel's centre.
-    pub fn windings(&self, mesh: &TriangleMesh) -> Vec<i16> {
-        let mut sums = vec![0i16; self.len()];
-        let mut steps = vec![0i16; self.len()];
-        for axis in 0..3 {
-            steps.fill(0);
-            for triangle in 0..mesh.triangles().len() {
-                self.cross_columns(mesh.corners(triangle), axis, &mut steps);
-            }
-            self.sum_columns(axis, &steps, &mut sums);
+    /// What rays from the centre of every voxel say: for a closed mesh one each, for an open one six.
+    pub fn findings(&self, mesh: &TriangleMesh, closed: bool) -> Vec<Finding> {
+        let mut findings = vec![Finding::default(); self.len()];
+        let axes = if closed { 1 } else { 3 };
+        for axis in 0..axes {
+            let steps = self.steps(mesh, axis);
+            self.walk_columns(axis, &steps, |voxel, below, above| {
+                let finding = &mut findings[voxel];
+                if axis == 0 {
+                    finding.winding = below;
+                }
+                for seen in [below, above] {
+                    finding.votes += u8::from(seen != 0);
+                    finding.agreeing += u8::from(seen == finding.winding);
+                }
+            });
         }
-        // Six rays: most of them must agree that the centre is enclosed, 4 for once, 10 for twice.
-        for sum in &mut sums {
-            *sum = sum.signum() * ((sum.saturating_abs().saturating_add(2)) / 6);
+        for finding in &mut findings {
+            finding.votes *= 3 / axes as u8;
+            finding.agreeing *= 3 / axes as u8;
         }
-        sums
+        findings
     }
 
-    /// Notes where the columns of voxel centres along an axis cross a triangle: at the first voxel behind it, the change
-    /// of the winding number there.
+    /// Where the columns of voxel centres along an axis cross the mesh: at the first voxel behind each crossing the
+    /// change of the winding number.
+    fn steps(&self, mesh: &TriangleMesh, axis: usize) -> Vec<i16> {
+        let mut steps = vec![0i16; self.len()];
+        for triangle in 0..mesh.triangles().len() {
+            self.cross_columns(mesh.corners(triangle), axis, &mut steps);
+        }
+        steps
+    }
+
+    /// Adds the crossings of one triangle.
     fn cross_columns(&self, corners: [Vec3; 3], axis: usize, steps: &mut [i16]) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let local = corners.map(|corner| self.local(corner) - 0.5);
@@ -146,7 +186,7 @@ impl Grid {
                 let behind = height.ceil().max(0.0) as usize;
                 let mut voxel = [0; 3];
                 (voxel[u], voxel[v], voxel[axis]) = (column_u, column_v, behind.min(self.size[axis] - 1));
-                // The padding leaves no crossing behind the last centre; rounding might.
+                // The grid reaches on behind the mesh; by rounding it might just not.
                 if behind < self.size[axis] {
                     let step = &mut steps[self.number(voxel)];
                     *step = step.saturating_sub(facing);
@@ -155,14 +195,14 @@ impl Grid {
         }
     }
 
-    /// Adds to every voxel the windings seen along both directions of an axis.
-    fn sum_columns(&self, axis: usize, steps: &[i16], sums: &mut [i16]) {
+    /// Visits every voxel with the windings that its centre sees along an axis, downwards and upwards.
+    fn walk_columns(&self, axis: usize, steps: &[i16], mut visit: impl FnMut(usize, i16, i16)) {
         // Voxels side by side across the axis are `inner` apart along it.
         let inner: usize = self.size[..axis].iter().product();
         let slab = inner * self.size[axis];
         let mut total = vec![0i16; inner];
         let mut running = vec![0i16; inner];
-        for (steps, sums) in steps.chunks_exact(slab).zip(sums.chunks_exact_mut(slab)) {
+        for (number, steps) in steps.chunks_exact(slab).enumerate() {
             total.fill(0);
             running.fill(0);
             for row in steps.chunks_exact(inner) {
@@ -170,12 +210,11 @@ impl Grid {
                     *total = total.saturating_add(*step);
                 }
             }
-            for (row, sums) in steps.chunks_exact(inner).zip(sums.chunks_exact_mut(inner)) {
-                for (((running, total), step), sum) in running.iter_mut().zip(&total).zip(row).zip(sums) {
+            for (level, row) in steps.chunks_exact(inner).enumerate() {
+                let first = number * slab + level * inner;
+                for (place, ((running, total), step)) in running.iter_mut().zip(&total).zip(row).enumerate() {
                     *running = running.saturating_add(*step);
-                    // From below it is what was crossed so far, from above what is still to come.
-                    let both = running.saturating_mul(2).saturating_sub(*total);
-                    *sum = sum.saturating_add(both);
+                    visit(first + place, *running, running.saturating_sub(*total));
                 }
             }
         }

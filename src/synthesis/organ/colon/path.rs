@@ -110,11 +110,11 @@ fn vary_sections(points: &mut [Vec3], draw: &mut impl FnMut(f32) -> f32) {
         points[index] += Vec3::new(0.0, -sag, front) * share;
     }
     let flexure = [draw(0.015), draw(0.018)];
-    for index in 3..7 {
-        points[index].y += flexure[0];
+    for point in &mut points[3..7] {
+        point.y += flexure[0];
     }
-    for index in 10..15 {
-        points[index].y += flexure[1];
+    for point in &mut points[10..15] {
+        point.y += flexure[1];
     }
     let loop_shift = Vec3::new(draw(0.02), draw(0.025), draw(0.012));
     for index in SIGMOID {

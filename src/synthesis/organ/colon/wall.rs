@@ -144,9 +144,9 @@ impl Wall {
             }
             Side::Inner => {
                 let across = place.haustrum.to_fold / (FOLD_WIDTH * self.unit);
-                let crest = ops::exp(-across * across) * place.roundness;
-                let belly = GROOVE - TAENIA + BULGE * place.haustrum.bulge * place.roundness - FOLD * crest;
-                1.0 + depth * (TAENIA - 1.0 + place.belly * belly)
+                let crescent = FOLD * ops::exp(-across * across) * place.crescent;
+                let belly = GROOVE - TAENIA + BULGE * place.haustrum.bulge * place.roundness;
+                1.0 + depth * (TAENIA - 1.0 + place.belly * belly - crescent)
             }
         };
         let uneven = 1.0 + 0.018 * self.shape_noise.at(self.noise_point(section, angle, 0.022));
@@ -159,11 +159,11 @@ impl Wall {
         let mottle = self.colour_noise.rough(self.noise_point(section, angle, 0.016));
         match side {
             Side::Outer => {
-                let serosa = mix(linear([205, 128, 114]), linear([222, 158, 140]), place.haustrum.bulge);
-                let creased = mix(serosa, linear([182, 96, 86]), 0.5 * self.crease(&place) * section.depth);
-                let taenia = linear([236, 200, 180]);
+                let serosa = mix(linear([190, 106, 96]), linear([208, 134, 118]), place.haustrum.bulge);
+                let creased = mix(serosa, linear([160, 74, 68]), 0.65 * self.crease(&place) * section.depth);
+                let taenia = linear([226, 182, 160]);
                 let banded = mix(creased, taenia, 0.8 * (1.0 - place.belly) * smooth_step(0.0, 0.3, section.depth));
-                mix(banded, linear([196, 104, 96]), 0.22 * (mottle + 0.4))
+                mix(banded, linear([178, 84, 80]), 0.28 * (mottle + 0.4))
             }
             Side::Inner => {
                 let mucosa = mix(linear([196, 92, 80]), linear([214, 122, 104]), place.haustrum.bulge);
@@ -183,9 +183,11 @@ impl Wall {
         let row = (turn as usize).min(ROWS - 1);
         let across = turn - row as f32;
         let to_taenia = across.min(1.0 - across) * (TAU / ROWS as f32) * section.mean.max(section.thickness);
+        let sine = ops::sin(PI * across);
         Place {
             belly: smooth_step(0.75 * self.taenia_half_width, 1.9 * self.taenia_half_width, to_taenia),
-            roundness: 0.55 + 0.45 * ops::sin(PI * across),
+            roundness: 0.55 + 0.45 * sine,
+            crescent: smooth_step(0.0, 0.75, sine),
             haustrum: section.haustra[row],
         }
     }
@@ -201,6 +203,8 @@ struct Place {
     belly: f32,
     /// How round the haustrum is across: 1 in its middle.
     roundness: f32,
+    /// How far a fold stands up across: from 0 at a taenia to 1, so that it has the shape of a half moon.
+    crescent: f32,
     haustrum: Haustrum,
 }
 

@@ -1,5 +1,8 @@
 //! Tissues against their oracles: analytic moments, brute force, and meshes whose volume is known.
 
+mod fields;
+mod volume;
+
 use bevy_math::{
     Vec3,
     bounding::{Aabb3d, BoundingVolume},

@@ -1,0 +1,91 @@
+//! Keys that steer every organ of an example, and the line that tells how far they are.
+
+use super::{
+    endoscopy::look_inside,
+    light::moist_tissue,
+    studio::{StatusLine, View},
+};
+use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, prelude::*};
+use bevy_vessels::prelude::*;
+
+/// What the keys of [`ControlsPlugin`] do.
+pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours\nI  inside, up and down travel";
+
+/// An organ on show, vessels or none.
+#[derive(Component)]
+pub struct Organ;
+
+/// Space pauses, `.` steps, `A` and `V` show arteries and veins, `C` changes what colours tell. Where there is a window.
+pub struct ControlsPlugin;
+
+impl Plugin for ControlsPlugin {
+    fn build(&self, app: &mut App) {
+        let in_window = resource_exists_and_equals(View::Window);
+        app.add_plugins(FrameTimeDiagnosticsPlugin::default())
+            .add_systems(Update, (steer, show, tell, look_inside).chain().run_if(in_window));
+    }
+}
+
+/// What organs are made of.
+#[derive(SystemParam)]
+pub struct OrganAssets<'w> {
+    meshes: ResMut<'w, Assets<Mesh>>,
+    materials: Option<ResMut<'w, Assets<StandardMaterial>>>,
+}
+
+impl OrganAssets<'_> {
+    /// The parts of an organ that are seen: its mesh, of moist tissue of a colour, or of its own colours where that is white.
+    pub fn organ(&mut self, mesh: Mesh, color: Color, place: Transform) -> impl Bundle {
+        let material = StandardMaterial { base_color: color, ..moist_tissue() };
+        // Without a renderer there are no materials, and nobody looks.
+        let material = self.materials.as_mut().map(|materials| materials.add(material)).unwrap_or_default();
+        (Organ, Mesh3d(self.meshes.add(mesh)), MeshMaterial3d(material), place)
+    }
+}
+
+fn steer(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut organs: Query<(Entity, &mut GrowthControl)>,
+    mut commands: MessageWriter<GrowthCommand>,
+) {
+    for (organ, mut control) in &mut organs {
+        if keys.just_pressed(KeyCode::Space) {
+            control.toggle();
+        }
+        if keys.just_pressed(KeyCode::Period) {
+            commands.write(GrowthCommand::new(organ, GrowthAction::Step(1)));
+        }
+    }
+}
+
+fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>) {
+    for (key, system) in [(KeyCode::KeyA, System::Arterial), (KeyCode::KeyV, System::Venous)] {
+        for mut look in looks.iter_mut().filter(|_| keys.just_pressed(key)) {
+            let shown = look.shows(system);
+            look.set_shown(system, !shown);
+        }
+    }
+    for mut look in looks.iter_mut().filter(|_| keys.just_pressed(KeyCode::KeyC)) {
+        look.coloring = match look.coloring {
+            SegmentColoring::System => SegmentColoring::Radius,
+            SegmentColoring::Radius => SegmentColoring::Age,
+            SegmentColoring::Age => SegmentColoring::StrahlerOrder,
+            SegmentColoring::StrahlerOrder => SegmentColoring::System,
+        };
+    }
+}
+
+fn tell(
+    organs: Query<(&Vasculature, &GrowthProgress, &GrowthControl)>,
+    diagnostics: Res<bevy::diagnostic::DiagnosticsStore>,
+    mut status: ResMut<StatusLine>,
+) {
+    let Some((vasculature, first, control)) = organs.iter().next() else { return };
+    let nodes: usize = organs.iter().flat_map(|(_, progress, _)| progress.nodes).sum();
+    let paused = if *control == GrowthControl::Paused { ", paused" } else { "" };
+    let fps = diagnostics.get(&FrameTimeDiagnosticsPlugin::FPS).and_then(|fps| fps.smoothed()).unwrap_or_default();
+    status.0 = format!(
+        "seed {} · step {} of {}{paused} · {nodes} nodes · {fps:.0} frames a second",
+        vasculature.seed, first.step, first.steps
+    );
+}

@@ -1,0 +1,179 @@
+//! Without a window: vessels grow frame by frame, then pictures are taken, networks written and figures printed.
+
+use super::{
+    headless::{OffscreenTarget, PipelinesReady, write_picture},
+    light::Endoscope,
+    studio::{StudioArgs, View, transform_of},
+};
+use bevy::{
+    prelude::*,
+    render::view::screenshot::{Screenshot, ScreenshotCaptured},
+};
+use bevy_vessels::{
+    prelude::*,
+    synthesis::{
+        io::{SwcOptions, save_swc},
+        organ::Viewpoint,
+    },
+};
+use std::time::Duration;
+
+/// The pictures to take once the vessels are grown.
+#[derive(Resource, Clone, Default)]
+pub struct Shots(pub Vec<Shot>);
+
+/// A picture to take.
+#[derive(Clone)]
+pub struct Shot {
+    /// Name of the file.
+    pub file: &'static str,
+    /// Where the camera stands.
+    pub view: Viewpoint,
+    /// Vertical field of view, in degrees.
+    pub field_of_view: f32,
+    /// Whether the only light is the camera's.
+    pub endoscope: bool,
+}
+
+/// Takes the [`Shots`] and ends the app.
+pub struct PhotoPlugin;
+
+impl Plugin for PhotoPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Shots>()
+            .init_resource::<Session>()
+            .add_systems(Update, (give_up, grow.run_if(not(grown)), photograph.run_if(grown)).chain());
+    }
+}
+
+/// Frames that a view is drawn before its picture is taken: shadows and buffers have caught up then.
+const STILL_FRAMES: u32 = 2;
+
+#[derive(Resource, Default)]
+struct Session {
+    grown: bool,
+    frame_times: Vec<Duration>,
+    shot: usize,
+    still: u32,
+    waiting: bool,
+}
+
+fn grown(session: Res<Session>) -> bool {
+    session.grown
+}
+
+/// An organ that cannot grow, or a picture that cannot be written, ends the app with an error.
+fn give_up(mut failures: MessageReader<GrowthFailed>, mut exit: MessageWriter<AppExit>) {
+    for failure in failures.read() {
+        eprintln!("{}", failure.error);
+        exit.write(AppExit::error());
+    }
+}
+
+/// Shares the steps out over the frames that the user asked for; what is left then is done at once.
+fn grow(
+    args: Res<StudioArgs>,
+    time: Res<Time<Real>>,
+    organs: Query<(Entity, &Vasculature, &GrowthProgress)>,
+    mut session: ResMut<Session>,
+    mut budget: ResMut<GrowthBudget>,
+    mut commands: MessageWriter<GrowthCommand>,
+) {
+    if organs.is_empty() {
+        return;
+    }
+    let steps: u32 = organs.iter().map(|(_, vasculature, _)| vasculature.settings.steps).sum();
+    budget.set_if_neq(GrowthBudget::Steps(steps.div_ceil(args.frames)));
+    if organs.iter().any(|(.., progress)| progress.step > 0) {
+        session.frame_times.push(time.delta());
+    }
+    if session.frame_times.len() > args.frames as usize {
+        commands.write_batch(organs.iter().map(|(organ, ..)| GrowthCommand::new(organ, GrowthAction::Finish)));
+    }
+    session.grown = organs.iter().all(|(.., progress)| progress.is_finished());
+}
+
+fn photograph(
+    mut commands: Commands,
+    mut session: ResMut<Session>,
+    scene: (Res<Shots>, Res<View>, Res<StudioArgs>),
+    offscreen: Option<(Res<OffscreenTarget>, Res<PipelinesReady>)>,
+    mut endoscope: Option<ResMut<Endoscope>>,
+    mut camera: Query<(&mut Transform, &mut Projection), With<Camera3d>>,
+    networks: Networks,
+    mut exit: MessageWriter<AppExit>,
+) {
+    let (shots, _, args) = scene;
+    let (Some(shot), Some((target, ready))) = (shots.0.get(session.shot), offscreen) else {
+        networks.write(&args);
+        networks.print_figures(&mut session.frame_times);
+        exit.write(AppExit::Success);
+        return;
+    };
+    if session.waiting {
+        return;
+    }
+    for (mut transform, mut projection) in &mut camera {
+        *transform = transform_of(&shot.view);
+        if let Projection::Perspective(lens) = &mut *projection {
+            lens.fov = shot.field_of_view.to_radians();
+        }
+    }
+    if let Some(endoscope) = &mut endoscope {
+        endoscope.0 = shot.endoscope;
+    }
+    session.still = if ready.0 { session.still + 1 } else { 0 };
+    if session.still > STILL_FRAMES {
+        session.waiting = true;
+        let path = args.out.join(shot.file);
+        commands.spawn(Screenshot::image(target.0.clone())).observe(
+            move |captured: On<ScreenshotCaptured>, mut session: ResMut<Session>, mut exit: MessageWriter<AppExit>| {
+                match write_picture(&captured.image, &path) {
+                    Ok(()) => println!("{}", path.display()),
+                    Err(error) => {
+                        eprintln!("{}: {error}", path.display());
+                        exit.write(AppExit::error());
+                    }
+                }
+                *session = Session { shot: session.shot + 1, still: 0, waiting: false, ..std::mem::take(&mut session) };
+            },
+        );
+    }
+}
+
+/// All vessels of all organs.
+#[derive(bevy::ecs::system::SystemParam)]
+struct Networks<'w, 's> {
+    organs: Query<'w, 's, (NameOrEntity, &'static GrowthProgress, Option<&'static OrganVessels>)>,
+    vessels: Query<'w, 's, (&'static VesselSystem, &'static Vessels)>,
+}
+
+impl Networks<'_, '_> {
+    fn write(&self, args: &StudioArgs) {
+        for (name, _, vessels) in &self.organs {
+            for (system, vessels) in self.vessels.iter_many(vessels.map_or(&[][..], OrganVessels::entities)) {
+                let path = args.out.join(format!("{name}_{}.swc", system.0.name()));
+                let written = std::fs::create_dir_all(&args.out).map_err(|error| error.to_string()).and_then(|()| {
+                    save_swc(&path, vessels.tree(), &SwcOptions::default()).map_err(|error| error.to_string())
+                });
+                match written {
+                    Ok(()) => println!("{}", path.display()),
+                    Err(error) => eprintln!("{}: {error}", path.display()),
+                }
+            }
+        }
+    }
+
+    fn print_figures(&self, frame_times: &mut [Duration]) {
+        for (name, progress, _) in &self.organs {
+            let [arterial, venous] = progress.nodes;
+            let ms = progress.grow_time.as_secs_f64() * 1000.0;
+            println!("{name}: {} steps, {arterial} + {venous} nodes, grown in {ms:.0} ms", progress.step);
+        }
+        frame_times.sort_unstable();
+        if let Some(last) = frame_times.len().checked_sub(1) {
+            let at = |share: usize| frame_times[last * share / 100].as_secs_f64() * 1000.0;
+            println!("{} frames while growing: median {:.0} ms, 99th percentile {:.0} ms", last + 1, at(50), at(99));
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! A place to look at organs: lights, a camera, and a window to look through or a folder to put pictures in.
+
+use super::{
+    headless::{HOW_TO_GET_PICTURES, OffscreenPlugin, OffscreenTarget, find_adapter, headless_plugins},
+    light::{LightPlugin, camera_lights},
+    photo::PhotoPlugin,
+};
+use bevy::{asset::UnapprovedPathMode, log::LogPlugin, prelude::*};
+use bevy_panorbit_camera::{PanOrbitCamera, PanOrbitCameraPlugin};
+use bevy_vessels::synthesis::organ::Viewpoint;
+use std::path::PathBuf;
+
+/// What every example understands.
+#[derive(clap::Args, Resource, Clone, Debug)]
+pub struct StudioArgs {
+    /// Write pictures and networks instead of opening a window. So it is where there is no display, too.
+    #[arg(long)]
+    pub headless: bool,
+    /// Frames over which the vessels grow, without a window.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    pub frames: u32,
+    /// Folder for pictures and networks.
+    #[arg(long, default_value = "out")]
+    pub out: PathBuf,
+    /// Width and height of the pictures, in pixels.
+    #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"], default_values_t = [1280, 960])]
+    pub size: Vec<u32>,
+}
+
+/// Bevy with a window, or without, and everything needed to see an organ of about one unit at the origin.
+pub struct StudioPlugin {
+    /// What the user asked for.
+    pub args: StudioArgs,
+    /// Title of the window.
+    pub title: &'static str,
+    /// What the keys do, one line each.
+    pub help: &'static str,
+}
+
+/// Whether there is a window.
+#[derive(Resource, Clone, Copy, PartialEq, Eq)]
+pub enum View {
+    /// A window, with a camera that the mouse turns.
+    Window,
+    /// Pictures are taken.
+    Pictures,
+    /// There is nothing to draw with.
+    Nothing,
+}
+
+/// The line below the keys.
+#[derive(Resource, Default)]
+pub struct StatusLine(pub String);
+
+#[derive(Resource)]
+struct Help(&'static str);
+
+impl Plugin for StudioPlugin {
+    fn build(&self, app: &mut App) {
+        let view = if self.args.headless || !has_display() { self.add_headless(app) } else { self.add_window(app) };
+        app.insert_resource(view).insert_resource(self.args.clone()).insert_resource(Help(self.help));
+        app.init_resource::<StatusLine>();
+        if view != View::Nothing {
+            app.add_plugins(LightPlugin).add_systems(Startup, spawn_camera);
+        }
+    }
+}
+
+impl StudioPlugin {
+    fn add_window(&self, app: &mut App) -> View {
+        let window = Window { title: self.title.into(), ..default() };
+        let window = WindowPlugin { primary_window: Some(window), ..default() };
+        app.add_plugins(DefaultPlugins.set(window).set(any_file()))
+            .add_plugins(PanOrbitCameraPlugin)
+            .add_systems(Startup, spawn_texts)
+            .add_systems(Update, show_status.run_if(resource_changed::<StatusLine>));
+        View::Window
+    }
+
+    fn add_headless(&self, app: &mut App) -> View {
+        let adapter = find_adapter();
+        match &adapter {
+            Some(name) => println!("no window: drawing to files on {name}"),
+            None => println!("{HOW_TO_GET_PICTURES}"),
+        }
+        // A software driver is no news here, and nor are cameras without a window.
+        let log = LogPlugin { filter: "warn,bevy_render=error,bevy_light=error,wgpu=error".into(), ..default() };
+        app.add_plugins(headless_plugins(adapter.is_some()).set(log).set(any_file()));
+        if adapter.is_some() {
+            app.add_plugins(OffscreenPlugin { size: UVec2::new(self.args.size[0].max(16), self.args.size[1].max(16)) });
+        }
+        app.add_plugins(PhotoPlugin);
+        if adapter.is_some() { View::Pictures } else { View::Nothing }
+    }
+}
+
+/// Organs may lie anywhere, not only in an assets folder.
+fn any_file() -> AssetPlugin {
+    AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() }
+}
+
+fn has_display() -> bool {
+    !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
+}
+
+fn spawn_camera(mut commands: Commands, mut images: ResMut<Assets<Image>>, target: Option<Res<OffscreenTarget>>) {
+    let projection = Projection::from(PerspectiveProjection { near: 0.002, ..default() });
+    let mut camera = commands.spawn((Camera3d::default(), projection, Msaa::Sample4, camera_lights(&mut images)));
+    match target {
+        Some(target) => camera.insert(bevy::camera::RenderTarget::from(target.0.clone())),
+        None => camera.insert(PanOrbitCamera { button_pan: MouseButton::Right, ..default() }),
+    };
+    camera.insert(transform_of(&front_view()));
+}
+
+/// A view of an organ of unit size from the front.
+pub fn front_view() -> Viewpoint {
+    Viewpoint { eye: Vec3::new(0.1, 0.1, 1.5), target: Vec3::ZERO, up: Vec3::Y }
+}
+
+/// Where a camera stands for a view.
+pub fn transform_of(view: &Viewpoint) -> Transform {
+    Transform::from_translation(view.eye).looking_at(view.target, view.up)
+}
+
+/// The transform that puts an organ, between two corners in any unit, at the origin and makes it one unit large.
+pub fn to_unit_size((low, high): (Vec3, Vec3)) -> Transform {
+    let scale = 1.0 / (high - low).max_element().max(f32::MIN_POSITIVE);
+    Transform::from_translation(-0.5 * (low + high) * scale).with_scale(Vec3::splat(scale))
+}
+
+/// A view of an organ, after the organ has been moved.
+pub fn moved(view: &Viewpoint, place: &Transform) -> Viewpoint {
+    Viewpoint { eye: place.transform_point(view.eye), target: place.transform_point(view.target), up: view.up }
+}
+
+#[derive(Component)]
+struct StatusText;
+
+fn spawn_texts(mut commands: Commands, help: Res<Help>) {
+    let font = TextFont { font_size: FontSize::Px(14.0), ..default() };
+    let node = |bottom, top| Node { position_type: PositionType::Absolute, left: px(12), bottom, top, ..default() };
+    let color = TextColor(Color::srgba(1.0, 1.0, 1.0, 0.75));
+    commands.spawn((Text::new(help.0), font.clone(), color, node(auto(), px(12))));
+    commands.spawn((Text::default(), font, color, node(px(12), auto()), StatusText));
+}
+
+fn show_status(status: Res<StatusLine>, mut text: Single<&mut Text, With<StatusText>>) {
+    text.0.clone_from(&status.0);
+}

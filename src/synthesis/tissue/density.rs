@@ -1,0 +1,171 @@
+//! Density fields: where a tissue asks for more vessels and where for fewer, such as hypoxic regions.
+
+use super::{
+    Extent, Tissue, TissuePoint,
+    error::{TissueError, finite_point, positive},
+    triangle::TriangleIndex,
+};
+use crate::synthesis::{mesh::TriangleMesh, rng::VesselRng};
+use bevy_math::{UVec3, Vec3, bounding::Aabb3d};
+use rand::RngExt;
+use std::{fmt, sync::Arc};
+
+/// The probability, from 0 to 1, with which a sample is kept, at every point. Values outside that range are clamped.
+#[derive(Clone)]
+pub struct DensityField(Field);
+
+#[derive(Clone)]
+enum Field {
+    Function(Arc<dyn Fn(Vec3) -> f32 + Send + Sync>),
+    Vertices { index: Arc<TriangleIndex>, triangles: Arc<[[u32; 3]]>, values: Arc<[f32]> },
+    Grid { size: [usize; 3], spacing: Vec3, origin: Vec3, values: Arc<[f32]> },
+}
+
+impl DensityField {
+    /// A field given by a function, for determinism's sake one that always gives the same value for the same point.
+    ///
+    /// Where the value is no number, no sample is kept.
+    pub fn function(field: impl Fn(Vec3) -> f32 + Send + Sync + 'static) -> Self {
+        Self(Field::Function(Arc::new(field)))
+    }
+
+    /// A field painted on a mesh: one value per vertex, interpolated over the triangles. Away from the mesh the value of
+    /// its nearest point counts.
+    ///
+    /// # Errors
+    /// Values that are not one per vertex, or not a number.
+    pub fn on_vertices(mesh: &TriangleMesh, values: &[f32]) -> Result<Self, TissueError> {
+        let expected = mesh.positions().len();
+        let values = check(values, expected)?;
+        let (index, triangles) = (Arc::new(TriangleIndex::new(mesh)), mesh.triangles().into());
+        Ok(Self(Field::Vertices { index, triangles, values }))
+    }
+
+    /// A field on the points of a grid, along x first, then y, then z, interpolated between them. `origin` is the first
+    /// point. Beyond the grid the value at its border counts.
+    ///
+    /// # Errors
+    /// Values that are not one per point, or not a number; a spacing that is not above 0; an origin that is not finite.
+    pub fn on_grid(size: UVec3, spacing: Vec3, origin: Vec3, values: &[f32]) -> Result<Self, TissueError> {
+        let size = size.to_array().map(|count| count as usize);
+        for side in spacing.to_array() {
+            positive("the spacing of the density grid", side)?;
+        }
+        finite_point("the origin of the density grid", origin)?;
+        let expected = size[0].saturating_mul(size[1]).saturating_mul(size[2]);
+        if expected == 0 {
+            return Err(TissueError::DensityCount { values: values.len(), expected: 1 });
+        }
+        Ok(Self(Field::Grid { size, spacing, origin, values: check(values, expected)? }))
+    }
+
+    /// The field's value at a point, from 0 to 1.
+    pub fn at(&self, point: Vec3) -> f32 {
+        let value = match &self.0 {
+            Field::Function(field) => field(point),
+            Field::Vertices { index, triangles, values } => index.closest(point).map_or(0.0, |found| {
+                let corners = triangles[found.triangle].map(|vertex| values[vertex as usize]);
+                Vec3::from_array(corners).dot(found.barycentric)
+            }),
+            Field::Grid { size, spacing, origin, values } => interpolate(*size, (point - *origin) / *spacing, values),
+        };
+        if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
+    }
+}
+
+impl fmt::Debug for DensityField {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0 {
+            Field::Function(_) => f.write_str("DensityField::function"),
+            Field::Vertices { values, .. } => write!(f, "DensityField::on_vertices({})", values.len()),
+            Field::Grid { size, .. } => write!(f, "DensityField::on_grid({size:?})"),
+        }
+    }
+}
+
+fn check(values: &[f32], expected: usize) -> Result<Arc<[f32]>, TissueError> {
+    if values.len() != expected {
+        return Err(TissueError::DensityCount { values: values.len(), expected });
+    }
+    if let Some(index) = values.iter().position(|value| value.is_nan()) {
+        return Err(TissueError::DensityNotANumber { index });
+    }
+    Ok(values.iter().map(|value| value.clamp(0.0, 1.0)).collect())
+}
+
+/// Linear interpolation along each axis between the eight values around a place on the grid.
+fn interpolate(size: [usize; 3], local: Vec3, values: &[f32]) -> f32 {
+    if local.is_nan() {
+        return 0.0;
+    }
+    let last = size.map(|count| count - 1);
+    let local = local.clamp(Vec3::ZERO, Vec3::from_array(last.map(|count| count as f32)));
+    let low: [usize; 3] = std::array::from_fn(|axis| (local[axis] as usize).min(last[axis]));
+    let part = local - Vec3::from_array(low.map(|index| index as f32));
+    let mut sum = 0.0;
+    for corner in 0..8usize {
+        let mut weight = 1.0;
+        let mut place = [0; 3];
+        for axis in 0..3 {
+            let high = corner >> axis & 1;
+            weight *= if high == 1 { part[axis] } else { 1.0 - part[axis] };
+            place[axis] = (low[axis] + high).min(last[axis]);
+        }
+        sum += weight * values[(place[2] * size[1] + place[1]) * size[0] + place[0]];
+    }
+    sum
+}
+
+/// A tissue whose samples are kept with the local probability of a field.
+///
+/// The shape of the tissue stays what it is: nodes may lie where the field is 0.
+#[derive(Clone, Debug)]
+pub struct DensityTissue {
+    tissue: Arc<dyn Tissue>,
+    field: DensityField,
+}
+
+impl DensityTissue {
+    /// Puts a field over a tissue.
+    ///
+    /// # Errors
+    /// A tissue that changes in stages: put the field over its stages instead.
+    pub fn new(tissue: Arc<dyn Tissue>, field: DensityField) -> Result<Self, TissueError> {
+        if tissue.stage(1).is_some() {
+            return Err(TissueError::DensityOverStages);
+        }
+        Ok(Self { tissue, field })
+    }
+
+    /// The field.
+    pub fn field(&self) -> &DensityField {
+        &self.field
+    }
+}
+
+impl Tissue for DensityTissue {
+    fn bounds(&self) -> Aabb3d {
+        self.tissue.bounds()
+    }
+
+    fn extent(&self) -> Extent {
+        self.tissue.extent()
+    }
+
+    fn contains(&self, point: Vec3) -> bool {
+        self.tissue.contains(point)
+    }
+
+    fn closest_point(&self, point: Vec3) -> TissuePoint {
+        self.tissue.closest_point(point)
+    }
+
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
+        let point = self.tissue.sample(rng)?;
+        (rng.random::<f32>() < self.field.at(point)).then_some(point)
+    }
+
+    fn entrance(&self) -> Option<Vec3> {
+        self.tissue.entrance()
+    }
+}

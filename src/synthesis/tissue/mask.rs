@@ -1,0 +1,225 @@
+//! Masks: the set pixels of an image, or the set voxels of a volume image, as a tissue.
+
+use super::{
+    Extent, Tissue, TissuePoint,
+    bvh::{Bounds, BoxTree},
+    error::{TissueError, finite_point, positive},
+    voxels::BitGrid,
+};
+use crate::synthesis::rng::VesselRng;
+use bevy_math::{UVec2, UVec3, Vec2, Vec3, Vec3A, bounding::Aabb3d};
+use rand::RngExt;
+
+/// Distance, in the longest side of a cell, within which a point counts as part of a cell.
+const TOLERANCE: f32 = 1.0e-4;
+
+/// Cells of a regular grid, set or not.
+///
+/// Cells are listed along x first, then y, then z, each axis upwards: an image whose first row is its top has to be given
+/// upside down. Every set cell belongs to the tissue as a whole, a rectangle or a box.
+#[derive(Clone, Debug)]
+pub struct Mask {
+    size: [usize; 3],
+    spacing: Vec3,
+    origin: Vec3,
+    /// Whether it is an image, which lies in the plane of its origin.
+    flat: bool,
+    cells: BitGrid,
+    /// The set cells as a list.
+    set: Vec<u32>,
+    /// Runs of set cells along x, in the order of the index over them.
+    runs: Vec<Bounds>,
+    index: BoxTree,
+    bounds: Bounds,
+}
+
+impl Mask {
+    /// Most cells of a mask.
+    pub const MAX_CELLS: usize = 1 << 30;
+
+    /// The set pixels of an image of `size` pixels, each `spacing` wide and high.
+    ///
+    /// `origin` is the lowest corner of the first pixel. The image lies in the plane z = `origin.z` and faces up.
+    ///
+    /// # Errors
+    /// A list that does not have one entry per pixel, or none that is set; a spacing that is not above 0; coordinates that
+    /// are not finite.
+    pub fn image(size: UVec2, spacing: Vec2, origin: Vec3, inside: &[bool]) -> Result<Self, TissueError> {
+        // The thickness of a pixel is of no account.
+        Self::new(size.extend(1), spacing.extend(1.0), origin, inside, true)
+    }
+
+    /// The pixels of a grey image that are at least `threshold`. See [`image`](Self::image).
+    ///
+    /// # Errors
+    /// Those of [`image`](Self::image).
+    pub fn image_from_grey(
+        size: UVec2,
+        spacing: Vec2,
+        origin: Vec3,
+        grey: &[u8],
+        threshold: u8,
+    ) -> Result<Self, TissueError> {
+        Self::image(size, spacing, origin, &above(grey, threshold))
+    }
+
+    /// The set voxels of a volume image of `size` voxels, each as large as `spacing`.
+    ///
+    /// `origin` is the lowest corner of the first voxel.
+    ///
+    /// # Errors
+    /// A list that does not have one entry per voxel, or none that is set; a spacing that is not above 0; coordinates that
+    /// are not finite.
+    pub fn voxels(size: UVec3, spacing: Vec3, origin: Vec3, inside: &[bool]) -> Result<Self, TissueError> {
+        Self::new(size, spacing, origin, inside, false)
+    }
+
+    /// The voxels of a grey volume image that are at least `threshold`. See [`voxels`](Self::voxels).
+    ///
+    /// # Errors
+    /// Those of [`voxels`](Self::voxels).
+    pub fn voxels_from_grey(
+        size: UVec3,
+        spacing: Vec3,
+        origin: Vec3,
+        grey: &[u8],
+        threshold: u8,
+    ) -> Result<Self, TissueError> {
+        Self::voxels(size, spacing, origin, &above(grey, threshold))
+    }
+
+    fn new(size: UVec3, spacing: Vec3, origin: Vec3, inside: &[bool], flat: bool) -> Result<Self, TissueError> {
+        let size = size.to_array().map(|count| count as usize);
+        let expected = size[0].saturating_mul(size[1]).saturating_mul(size[2]);
+        if expected != inside.len() || expected > Self::MAX_CELLS {
+            return Err(TissueError::MaskSize { size, cells: inside.len(), limit: Self::MAX_CELLS });
+        }
+        for side in spacing.to_array() {
+            positive("the spacing of the mask", side)?;
+        }
+        finite_point("the origin of the mask", origin)?;
+        finite_point(
+            "the far corner of the mask",
+            origin + spacing * Vec3::from_array(size.map(|count| count as f32)),
+        )?;
+        let cells = BitGrid::new(expected, (0..expected).filter(|&cell| inside[cell]));
+        let set: Vec<u32> = cells.iter().map(|cell| cell as u32).collect();
+        let mut mask = Self {
+            size,
+            spacing,
+            origin,
+            flat,
+            cells,
+            set,
+            runs: Vec::new(),
+            index: BoxTree::default(),
+            bounds: Bounds::EMPTY,
+        };
+        if mask.set.is_empty() {
+            return Err(TissueError::EmptyMask);
+        }
+        let runs = mask.list_runs();
+        mask.bounds = runs.iter().fold(Bounds::EMPTY, |bounds, &run| bounds.with(run));
+        mask.index = BoxTree::new(runs.iter().copied());
+        mask.runs = mask.index.order().iter().map(|&id| runs[id as usize]).collect();
+        Ok(mask)
+    }
+
+    /// Number of set cells.
+    pub fn set_cells(&self) -> usize {
+        self.set.len()
+    }
+
+    /// Runs of set cells along x.
+    fn list_runs(&self) -> Vec<Bounds> {
+        self.set
+            .chunk_by(|&a, &b| b == a + 1 && !(b as usize).is_multiple_of(self.size[0]))
+            .map(|run| {
+                let min = self.corner(run[0] as usize, Vec3::ZERO);
+                let max = self.corner(run[run.len() - 1] as usize, Vec3::ONE);
+                Bounds { min: min.into(), max: max.into() }
+            })
+            .collect()
+    }
+
+    /// The point at a place within a cell, from 0 to 1 along each axis.
+    fn corner(&self, cell: usize, within: Vec3) -> Vec3 {
+        let [x, y, _] = self.size;
+        let first = Vec3::new((cell % x) as f32, (cell / x % y) as f32, (cell / (x * y)) as f32);
+        let point = self.origin + self.spacing * (first + within);
+        if self.flat { point.with_z(self.origin.z) } else { point }
+    }
+
+    /// The cell around a point, whatever its height over an image.
+    fn cell(&self, point: Vec3) -> Option<usize> {
+        let local = (point - self.origin) / self.spacing;
+        let local = if self.flat { local.with_z(0.0) } else { local };
+        let inside = local.cmpge(Vec3::ZERO).all() && (0..3).all(|axis| local[axis] < self.size[axis] as f32);
+        let [x, y, z] = local.to_array().map(|value| value as usize);
+        inside.then_some((z * self.size[1] + y) * self.size[0] + x).filter(|&cell| cell < self.size.iter().product())
+    }
+
+    fn tolerance(&self) -> f32 {
+        let spacing = if self.flat { self.spacing.truncate().max_element() } else { self.spacing.max_element() };
+        // Far from the origin, rounding is more than that.
+        let rounding = f32::EPSILON * self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
+        (TOLERANCE * spacing).max(4.0 * rounding)
+    }
+
+    /// The nearest point of all set cells.
+    fn nearest(&self, point: Vec3, limit: f32) -> Option<Vec3> {
+        let point = Vec3A::from(point);
+        let mut found = None;
+        self.index.nearest(point.into(), limit * limit, |slot, best| {
+            let candidate = point.clamp(self.runs[slot].min, self.runs[slot].max);
+            let distance = candidate.distance_squared(point);
+            if distance < best || found.is_none() && distance <= best {
+                found = Some(candidate.into());
+                return distance;
+            }
+            best
+        });
+        found
+    }
+}
+
+impl Tissue for Mask {
+    fn bounds(&self) -> Aabb3d {
+        Aabb3d { min: self.bounds.min, max: self.bounds.max }
+    }
+
+    fn extent(&self) -> Extent {
+        let cells = self.set.len() as f32;
+        if self.flat {
+            Extent::Area(cells * self.spacing.x * self.spacing.y)
+        } else {
+            Extent::Volume(cells * self.spacing.element_product())
+        }
+    }
+
+    fn contains(&self, point: Vec3) -> bool {
+        let tolerance = self.tolerance();
+        let in_plane = !self.flat || (point.z - self.origin.z).abs() <= tolerance;
+        in_plane
+            && (self.cell(point).is_some_and(|cell| self.cells.contains(cell))
+                || self.nearest(point, tolerance).is_some())
+    }
+
+    fn closest_point(&self, point: Vec3) -> TissuePoint {
+        let inside = !self.flat && self.contains(point);
+        let position =
+            if inside || !point.is_finite() { point } else { self.nearest(point, f32::INFINITY).unwrap_or(point) };
+        TissuePoint { position, normal: if self.flat { Vec3::Z } else { Vec3::ZERO } }
+    }
+
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
+        let cell = self.set[rng.random_range(0..self.set.len() as u32) as usize];
+        let (x, y) = (rng.random(), rng.random());
+        let z = if self.flat { 0.0 } else { rng.random() };
+        Some(self.corner(cell as usize, Vec3::new(x, y, z)))
+    }
+}
+
+fn above(grey: &[u8], threshold: u8) -> Vec<bool> {
+    grey.iter().map(|&value| value >= threshold).collect()
+}

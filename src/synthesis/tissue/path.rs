@@ -1,0 +1,214 @@
+//! Guides: polylines along which large vessels are led before the tissue around them is filled (Rauch & Harders 2021,
+//! Fig. 4).
+
+use super::{
+    Extent, Tissue, TissuePoint,
+    bvh::{Bounds, BoxTree},
+    error::{TissueError, finite, finite_point},
+    shape::in_unit_ball,
+};
+use crate::synthesis::rng::VesselRng;
+use bevy_math::{
+    Vec3,
+    bounding::{Aabb3d, BoundingVolume},
+};
+use rand::RngExt;
+use std::sync::Arc;
+
+/// Pieces that a guide is cut into when it is laid on another tissue.
+const PIECES: f32 = 256.0;
+/// Most points of a guide.
+const MAX_POINTS: usize = 1 << 20;
+/// Most tries at a sample.
+const TRIES: u32 = 16;
+/// What a guide's own points are forgiven, relative to the guide's length.
+const TOLERANCE: f32 = 1.0e-5;
+
+/// A polyline with a deviation: the tube around it in which points are drawn.
+///
+/// Points are drawn evenly along the line and displaced within a ball of the deviation's radius. A guide laid
+/// [over](Self::over) a surface keeps to the surface.
+#[derive(Clone, Debug)]
+pub struct GuidePath {
+    points: Vec<Vec3>,
+    /// Length of the line up to each point.
+    lengths: Vec<f32>,
+    /// Deviation at the beginning and at the end.
+    deviations: [f32; 2],
+    index: BoxTree,
+    base: Option<Arc<dyn Tissue>>,
+    /// Distance from the line, beside the deviation, at which the tissue below may lie.
+    slack: f32,
+}
+
+/// A place on the line.
+struct Foot {
+    position: Vec3,
+    /// Share of the line's length before it.
+    share: f32,
+    distance: f32,
+}
+
+impl GuidePath {
+    /// A guide along `points`, with this `deviation` on all its length.
+    ///
+    /// # Errors
+    /// Fewer than two points, points that all coincide, coordinates that are not finite, a deviation below 0.
+    pub fn new(points: Vec<Vec3>, deviation: f32) -> Result<Self, TissueError> {
+        Self::build(points, [check_deviation(deviation)?; 2])
+    }
+
+    /// The same guide with a deviation that changes evenly to this value at its end.
+    ///
+    /// # Errors
+    /// A deviation that is below 0 or not finite.
+    pub fn with_end_deviation(mut self, deviation: f32) -> Result<Self, TissueError> {
+        self.deviations[1] = check_deviation(deviation)?;
+        Ok(self)
+    }
+
+    /// The same guide laid on another tissue: it follows the tissue's nearest points, and so do the points drawn from it.
+    ///
+    /// # Errors
+    /// A guide that comes to lie in one point.
+    pub fn over(self, base: Arc<dyn Tissue>) -> Result<Self, TissueError> {
+        let spacing = self.length() / PIECES;
+        let mut points = vec![base.closest_point(self.points[0]).position];
+        for pair in self.points.windows(2) {
+            let pieces = (pair[0].distance(pair[1]) / spacing).ceil().max(1.0);
+            points.extend(
+                (1..=pieces as u32)
+                    .map(|piece| base.closest_point(pair[0].lerp(pair[1], piece as f32 / pieces)).position),
+            );
+        }
+        let mut laid = Self::build(points, self.deviations)?;
+        let gaps = laid.points.windows(2).map(|pair| {
+            let middle = pair[0].midpoint(pair[1]);
+            base.closest_point(middle).position.distance(middle)
+        });
+        laid.slack = 2.0 * gaps.fold(0.0, f32::max);
+        laid.base = Some(base);
+        Ok(laid)
+    }
+
+    fn build(points: Vec<Vec3>, deviations: [f32; 2]) -> Result<Self, TissueError> {
+        if points.len() < 2 || points.len() > MAX_POINTS {
+            return Err(TissueError::GuidePoints { points: points.len(), limit: MAX_POINTS });
+        }
+        for &point in &points {
+            finite_point("a point of a guide", point)?;
+        }
+        let mut length = 0.0;
+        let mut lengths = vec![0.0];
+        for pair in points.windows(2) {
+            length += pair[0].distance(pair[1]);
+            lengths.push(length);
+        }
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(TissueError::GuideLength { length });
+        }
+        let index = BoxTree::new(points.windows(2).map(Bounds::around));
+        Ok(Self { points, lengths, deviations, index, base: None, slack: 0.0 })
+    }
+
+    /// Length of the line.
+    pub fn length(&self) -> f32 {
+        self.lengths[self.lengths.len() - 1]
+    }
+
+    fn deviation(&self, share: f32) -> f32 {
+        self.deviations[0] + (self.deviations[1] - self.deviations[0]) * share
+    }
+
+    /// How far from the line a point at a foot may be.
+    fn reach(&self, foot: &Foot) -> f32 {
+        self.deviation(foot.share) + self.slack + TOLERANCE * self.length()
+    }
+
+    /// The nearest place on the line. `None` for a point that is not finite.
+    fn foot(&self, point: Vec3) -> Option<Foot> {
+        let mut found: Option<(f32, usize, f32)> = None;
+        self.index.nearest(point, f32::INFINITY, |slot, best| {
+            let segment = self.index.order()[slot] as usize;
+            let (from, to) = (self.points[segment], self.points[segment + 1]);
+            let along = to - from;
+            let squared = along.length_squared();
+            let part = if squared > 0.0 { ((point - from).dot(along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+            let distance = (from + along * part).distance_squared(point);
+            if distance < best || found.is_none() {
+                found = Some((distance, segment, part));
+                return distance;
+            }
+            best
+        });
+        let (distance, segment, part) = found.filter(|_| point.is_finite())?;
+        let length = self.lengths[segment] + (self.lengths[segment + 1] - self.lengths[segment]) * part;
+        Some(Foot {
+            position: self.points[segment].lerp(self.points[segment + 1], part),
+            share: length / self.length(),
+            distance: distance.sqrt(),
+        })
+    }
+
+    /// The place at a length along the line.
+    fn at(&self, length: f32) -> Vec3 {
+        let segment = self.lengths.partition_point(|&before| before <= length).clamp(1, self.points.len() - 1) - 1;
+        let (before, after) = (self.lengths[segment], self.lengths[segment + 1]);
+        let part = if after > before { (length - before) / (after - before) } else { 0.0 };
+        self.points[segment].lerp(self.points[segment + 1], part.clamp(0.0, 1.0))
+    }
+
+    fn on_base(&self, point: Vec3) -> TissuePoint {
+        match &self.base {
+            Some(base) => base.closest_point(point),
+            None => TissuePoint { position: point, normal: Vec3::ZERO },
+        }
+    }
+}
+
+impl Tissue for GuidePath {
+    fn bounds(&self) -> Aabb3d {
+        let line = Bounds::around(&self.points);
+        let widest = self.deviations[0].max(self.deviations[1]) + self.slack;
+        Aabb3d { min: line.min, max: line.max }.grow(bevy_math::Vec3A::splat(widest))
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::Length(self.length())
+    }
+
+    /// Whether the point is within the deviation of the line, and on the tissue that the guide is laid on.
+    fn contains(&self, point: Vec3) -> bool {
+        self.foot(point).is_some_and(|foot| foot.distance <= self.reach(&foot))
+            && self.base.as_ref().is_none_or(|base| base.contains(point))
+    }
+
+    /// The nearest point of the tube around the line; for one that tapers, seen from the nearest place on the line.
+    fn closest_point(&self, point: Vec3) -> TissuePoint {
+        let Some(foot) = self.foot(point) else { return TissuePoint { position: point, normal: Vec3::ZERO } };
+        let offset = (point - foot.position).clamp_length_max(self.deviation(foot.share));
+        let found = self.on_base(foot.position + offset);
+        // Where the tissue below bends away, the line itself is always near enough.
+        if self.contains(found.position) { found } else { self.on_base(foot.position) }
+    }
+
+    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
+        (0..TRIES).find_map(|_| {
+            let length = rng.random::<f32>() * self.length();
+            let displacement = in_unit_ball(rng)? * self.deviation(length / self.length());
+            let point = self.on_base(self.at(length) + displacement).position;
+            self.contains(point).then_some(point)
+        })
+    }
+
+    fn entrance(&self) -> Option<Vec3> {
+        Some(self.points[0])
+    }
+}
+
+fn check_deviation(deviation: f32) -> Result<f32, TissueError> {
+    if finite("the deviation of a guide", deviation)? < 0.0 {
+        return Err(TissueError::Negative { what: "the deviation of a guide", value: deviation });
+    }
+    Ok(deviation)
+}
