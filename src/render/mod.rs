@@ -145,7 +145,7 @@ impl SegmentLimits {
         if !flags.contains(DownlevelFlags::VERTEX_STORAGE) || limits.max_storage_buffers_per_shader_stage == 0 {
             return None;
         }
-        let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size as u64);
+        let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         // mesh tags and node indices are 32-bit
         let segments = (bytes / SegmentInstance::SIZE as u64).min(1 << 31) as usize;
         Some(Self { max_segments: segments - segments % SEGMENTS_PER_CHUNK })
