@@ -19,7 +19,10 @@ mod common;
 use bevy::prelude::*;
 use bevy_vessels::{
     prelude::*,
-    synthesis::organ::{ColonSettings, OrganMesh, RootSites},
+    synthesis::{
+        organ::{ColonSettings, OrganMesh, RootSites},
+        tree::System,
+    },
 };
 use clap::{Parser, ValueEnum};
 use common::{
@@ -50,6 +53,13 @@ struct Args {
     mode: Mode,
 }
 
+impl Args {
+    /// The organ's tint: where vessels grow inside it, it is glass.
+    fn tint(&self, color: Color) -> Color {
+        if self.mode == Mode::Surface { color } else { color.with_alpha(0.25) }
+    }
+}
+
 #[derive(ValueEnum, Clone, Copy, PartialEq)]
 enum Mode {
     Surface,
@@ -61,7 +71,7 @@ fn main() -> AppExit {
     let args = Args::parse();
     App::new()
         .add_plugins(StudioPlugin { args: args.studio.clone(), title: "Vessels of the colon", help: controls::HELP })
-        .add_plugins((VesselPlugin::default(), ControlsPlugin))
+        .add_plugins((VesselPlugin { segments: bevy_vessels::render::SegmentRenderPlugin { sides: std::env::var("SIDES").map_or(8, |s| s.parse().unwrap()), cap_rings: std::env::var("CAPS").map_or(1, |s| s.parse().unwrap()) }, ..default() }, ControlsPlugin))
         .insert_resource(args)
         .add_systems(Startup, spawn_organ)
         .add_systems(Update, spawn_file.run_if(resource_exists::<OrganFile>))
@@ -69,12 +79,11 @@ fn main() -> AppExit {
         .run()
 }
 
-fn spawn_organ(mut commands: Commands, args: Res<Args>, server: Res<AssetServer>) -> Result {
+fn spawn_organ(mut commands: Commands, args: Res<Args>, server: Res<AssetServer>) {
     match &args.mesh {
-        Some(path) => commands.insert_resource(OrganFile::load(path, &server)?),
+        Some(path) => commands.insert_resource(OrganFile::load(path, &server)),
         None => commands.run_system_cached(spawn_colon),
     }
-    Ok(())
 }
 
 /// `N`: the next seed's colon takes the place of this one.
@@ -91,8 +100,8 @@ fn next_seed(
     }
 }
 
-/// The vessels that the arguments ask for. Stouter than life, so that they show on a whole organ.
-fn vasculature(args: &Args, roots: Option<&RootSites>, stoutness: f32) -> Vasculature {
+/// The vessels that the arguments ask for, with their radii multiplied.
+fn vasculature(args: &Args, roots: Option<&RootSites>, radii: f32) -> Vasculature {
     let mut wish = Vasculature::new(args.preset).with_seed(args.seed);
     wish.tissue.mode = match args.mode {
         Mode::Surface => TissueMode::Surface,
@@ -100,9 +109,7 @@ fn vasculature(args: &Args, roots: Option<&RootSites>, stoutness: f32) -> Vascul
         Mode::Staged => TissueMode::Staged { surface_steps: wish.settings.steps / 2 },
     };
     for system in System::ALL {
-        let settings = wish.settings.system_mut(system);
-        settings.scale_terminal_radius = false;
-        settings.terminal_radius *= stoutness;
+        wish.settings.system_mut(system).terminal_radius *= radii;
     }
     let Some(roots) = roots else { return wish };
     wish.with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()))
@@ -113,15 +120,14 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let colon = ColonSettings { seed: args.seed, triangles: 120_000, ..default() }.generate()?;
     let place = to_unit_size(colon.mesh.bounds());
     let mut spawn = |name: &'static str, mesh: OrganMesh, wish: Option<Vasculature>| {
-        let mut organ = commands.spawn((Name::new(name), assets.organ(mesh.into(), Color::WHITE, place)));
+        let mut organ = commands.spawn((Name::new(name), assets.organ(mesh.into(), args.tint(Color::WHITE), place)));
         wish.map(|wish| organ.insert(wish));
     };
-    let whole = args.mode != Mode::Surface;
-    let outer = if whole { 0..colon.mesh.triangles.len() } else { colon.outer.clone() };
-    spawn("colon", colon.mesh.part(outer), Some(vasculature(&args, Some(&colon.roots), 1.35)));
-    if !whole {
+    let outer = if args.mode != Mode::Surface { 0..colon.mesh.triangles.len() } else { colon.outer.clone() };
+    spawn("colon", colon.mesh.part(outer), Some(vasculature(&args, Some(&colon.roots), 1.0)));
+    if args.mode == Mode::Surface {
         spawn("rim", colon.mesh.part(colon.outer.end..colon.inner.start), None);
-        let mucosa = vasculature(&args, Some(&colon.inner_roots), 0.6);
+        let mucosa = vasculature(&args, Some(&colon.inner_roots), 0.4);
         spawn("mucosa", colon.mesh.part(colon.inner.clone()), Some(mucosa));
     }
     let lumen = moved(&colon.lumen, &place);
@@ -142,11 +148,19 @@ fn spawn_file(
     files: OrganFiles,
     mut assets: OrganAssets,
     mut shots: ResMut<Shots>,
-) -> Result {
-    let Some((mesh, place)) = files.mesh(&file)? else { return Ok(()) };
-    let organ = assets.organ(mesh, Color::srgb(0.79, 0.47, 0.42), place);
-    commands.spawn((Name::new("organ"), organ, vasculature(&args, None, 1.35)));
+    mut exit: MessageWriter<AppExit>,
+) {
+    let (mesh, place) = match files.mesh(&file, &assets.meshes) {
+        Ok(Some(found)) => found,
+        Ok(None) => return,
+        Err(error) => {
+            eprintln!("{error}");
+            exit.write(AppExit::error());
+            return;
+        }
+    };
+    let organ = assets.organ(mesh, args.tint(Color::srgb(0.79, 0.47, 0.42)), place);
+    commands.spawn((Name::new("organ"), organ, vasculature(&args, None, 1.0)));
     commands.remove_resource::<OrganFile>();
     shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 42.0, endoscope: false }];
-    Ok(())
 }

@@ -6,7 +6,7 @@ use super::{
     studio::{StatusLine, View},
 };
 use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, prelude::*};
-use bevy_vessels::prelude::*;
+use bevy_vessels::{prelude::*, synthesis::tree::System};
 
 /// What the keys of [`ControlsPlugin`] do.
 pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours\nI  inside, up and down travel";
@@ -29,14 +29,16 @@ impl Plugin for ControlsPlugin {
 /// What organs are made of.
 #[derive(SystemParam)]
 pub struct OrganAssets<'w> {
-    meshes: ResMut<'w, Assets<Mesh>>,
+    /// Meshes, those of files included.
+    pub meshes: ResMut<'w, Assets<Mesh>>,
     materials: Option<ResMut<'w, Assets<StandardMaterial>>>,
 }
 
 impl OrganAssets<'_> {
-    /// The parts of an organ that are seen: its mesh, of moist tissue of a colour, or of its own colours where that is white.
-    pub fn organ(&mut self, mesh: Mesh, color: Color, place: Transform) -> impl Bundle {
-        let material = StandardMaterial { base_color: color, ..moist_tissue() };
+    /// The parts of an organ that are seen: its mesh, of moist tissue, tinted. A tint with an alpha below 1 lets the inside
+    /// show.
+    pub fn organ(&mut self, mesh: Mesh, tint: Color, place: Transform) -> impl Bundle + use<> {
+        let material = moist_tissue(tint);
         // Without a renderer there are no materials, and nobody looks.
         let material = self.materials.as_mut().map(|materials| materials.add(material)).unwrap_or_default();
         (Organ, Mesh3d(self.meshes.add(mesh)), MeshMaterial3d(material), place)

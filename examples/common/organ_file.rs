@@ -14,13 +14,9 @@ use std::path::Path;
 pub struct OrganFile(Handle<Gltf>);
 
 impl OrganFile {
-    /// Begins to load a file.
-    ///
-    /// # Errors
-    /// The file isn't there.
-    pub fn load(path: &Path, server: &AssetServer) -> Result<Self, String> {
-        let absolute = path.canonicalize().map_err(|error| format!("{}: {error}", path.display()))?;
-        Ok(Self(server.load(absolute)))
+    /// Begins to load a file. Whether it is there, and an organ, shows in [`OrganFiles::mesh`].
+    pub fn load(path: &Path, server: &AssetServer) -> Self {
+        Self(server.load(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())))
     }
 }
 
@@ -31,7 +27,6 @@ pub struct OrganFiles<'w> {
     files: Res<'w, Assets<Gltf>>,
     nodes: Res<'w, Assets<GltfNode>>,
     parts: Res<'w, Assets<GltfMesh>>,
-    meshes: Res<'w, Assets<Mesh>>,
 }
 
 impl OrganFiles<'_> {
@@ -39,7 +34,7 @@ impl OrganFiles<'_> {
     ///
     /// # Errors
     /// The file isn't glTF, or has no triangles.
-    pub fn mesh(&self, file: &OrganFile) -> Result<Option<(Mesh, Transform)>, String> {
+    pub fn mesh(&self, file: &OrganFile, meshes: &Assets<Mesh>) -> Result<Option<(Mesh, Transform)>, String> {
         if let LoadState::Failed(error) = self.server.load_state(&file.0) {
             return Err(error.to_string());
         }
@@ -52,7 +47,7 @@ impl OrganFiles<'_> {
         let is_child =
             |node: &GltfNode| nodes.iter().any(|other| other.children.iter().any(|child| self.is(child, node)));
         for node in nodes.iter().filter(|node| !is_child(node)) {
-            self.collect(node, GlobalTransform::IDENTITY, &mut all);
+            self.collect(node, meshes, GlobalTransform::IDENTITY, &mut all);
         }
         if all.indices.is_empty() {
             return Err("the file has no triangles".into());
@@ -65,15 +60,15 @@ impl OrganFiles<'_> {
         self.nodes.get(handle).is_some_and(|found| found.index == node.index)
     }
 
-    fn collect(&self, node: &GltfNode, parent: GlobalTransform, all: &mut Triangles) {
+    fn collect(&self, node: &GltfNode, meshes: &Assets<Mesh>, parent: GlobalTransform, all: &mut Triangles) {
         let place = parent.mul_transform(node.transform);
         let primitives =
             node.mesh.as_ref().and_then(|mesh| self.parts.get(mesh)).map_or(&[][..], |mesh| &mesh.primitives);
-        for mesh in primitives.iter().filter_map(|primitive| self.meshes.get(&primitive.mesh)) {
+        for mesh in primitives.iter().filter_map(|primitive| meshes.get(&primitive.mesh)) {
             all.add(mesh, place);
         }
         for child in node.children.iter().filter_map(|child| self.nodes.get(child)) {
-            self.collect(child, place, all);
+            self.collect(child, meshes, place, all);
         }
     }
 }

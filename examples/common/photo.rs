@@ -110,6 +110,7 @@ fn photograph(
         exit.write(AppExit::Success);
         return;
     };
+    println!("TMP {:?}", std::time::Instant::now());
     if session.waiting {
         return;
     }

@@ -1,0 +1,117 @@
+//! The presets side by side: six networks of one seed on discs, and one through the inside of a procedural liver.
+//!
+//! The discs are those of Fig. 5 of Rauch & Harders (2021): the paper's arteries and veins, then what a larger exponent κ, a
+//! larger direction weight ω, and a smaller and a larger bifurcation threshold φ make of them.
+//!
+//! Keys as on the screen. `--headless --out DIR` writes `discs.png` and `liver.png`.
+
+mod common;
+
+use bevy::prelude::*;
+use bevy_vessels::{
+    prelude::*,
+    synthesis::{
+        organ::{LiverSettings, Viewpoint},
+        tree::System,
+    },
+};
+use clap::Parser;
+use common::{
+    controls::{self, ControlsPlugin, OrganAssets},
+    photo::{Shot, Shots},
+    studio::{StudioArgs, StudioPlugin, moved, to_unit_size},
+};
+
+/// The presets side by side.
+#[derive(Parser, Resource, Clone)]
+struct Args {
+    #[command(flatten)]
+    studio: StudioArgs,
+    /// Which of the networks that a preset can give.
+    #[arg(long, default_value_t = 3)]
+    seed: u64,
+}
+
+/// What is on each disc: caption, preset, and the one system to show where it isn't both.
+const DISCS: [(&str, PresetName, Option<System>); 6] = [
+    ("arteries", PresetName::Paper, Some(System::Arterial)),
+    ("veins", PresetName::Paper, Some(System::Venous)),
+    ("larger \u{3ba}: wider angles", PresetName::WideAngles, Some(System::Arterial)),
+    ("larger \u{3c9}: straighter", PresetName::Straight, Some(System::Arterial)),
+    ("smaller \u{3c6}: symmetric", PresetName::Symmetric, Some(System::Arterial)),
+    ("larger \u{3c6}: lateral branches", PresetName::Lateral, Some(System::Arterial)),
+];
+/// Where the liver is, beside the discs.
+const LIVER: Vec3 = Vec3::new(3.2, 0.0, 0.0);
+
+fn main() -> AppExit {
+    let args = Args::parse();
+    App::new()
+        .add_plugins(StudioPlugin { args: args.studio.clone(), title: "Presets", help: controls::HELP })
+        .add_plugins((VesselPlugin::default(), ControlsPlugin))
+        .insert_resource(args)
+        .add_systems(Startup, (spawn_discs, spawn_liver).chain())
+        .add_systems(PostUpdate, place_captions.after(TransformSystems::Propagate))
+        .run()
+}
+
+/// A line of text below a place in the world.
+#[derive(Component)]
+struct Caption(Vec3);
+
+fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) {
+    for (index, (caption, preset, only)) in DISCS.into_iter().enumerate() {
+        let place = Transform::from_xyz((index % 3) as f32 * 1.12 - 1.12, 0.6 - (index / 3) as f32 * 1.2, 0.0);
+        let disc = Circle::new(0.5).mesh().resolution(160).build();
+        let shows = |system| only.is_none_or(|only| only == system);
+        commands.spawn((
+            Name::new(caption),
+            assets.organ(disc, Color::srgb(0.93, 0.87, 0.82), place),
+            Vasculature::new(preset).with_seed(args.seed),
+            VesselAppearance {
+                show_arterial: shows(System::Arterial),
+                show_venous: shows(System::Venous),
+                ..default()
+            },
+        ));
+        let text = (Text::new(caption), TextFont { font_size: FontSize::Px(18.0), ..default() });
+        let node = Node { position_type: PositionType::Absolute, ..default() };
+        commands.spawn((text, node, Caption(place.translation - 0.53 * Vec3::Y)));
+    }
+    let view = Viewpoint { eye: Vec3::new(0.0, -0.05, 3.0), target: Vec3::new(0.0, -0.05, 0.0), up: Vec3::Y };
+    shots.0.push(Shot { file: "discs.png", view, field_of_view: 46.0, endoscope: false });
+}
+
+fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) -> Result {
+    let liver = LiverSettings { seed: args.seed, ..default() }.generate()?;
+    let place = to_unit_size(liver.mesh.bounds());
+    let place = place.with_translation(place.translation + LIVER);
+    let roots = [&liver.roots.arterial, &liver.roots.venous].map(|sites| RootPlacement::Nearest(sites.clone()));
+    let [arterial, venous] = roots;
+    commands.spawn((
+        Name::new("liver"),
+        assets.organ(liver.mesh.into(), Color::srgba(1.0, 0.8, 0.75, 0.22), place),
+        Vasculature::new(PresetName::Liver).with_seed(args.seed).with_roots(arterial, venous),
+    ));
+    let view = moved(&liver.front, &place);
+    shots.0.push(Shot { file: "liver.png", view, field_of_view: 36.0, endoscope: false });
+    Ok(())
+}
+
+/// Captions stay below their discs wherever the camera is.
+fn place_captions(
+    camera: Option<Single<(&Camera, &GlobalTransform), With<Camera3d>>>,
+    mut captions: Query<(&Caption, &ComputedNode, &mut Node)>,
+) {
+    let Some(camera) = camera else { return };
+    for (caption, size, mut node) in &mut captions {
+        match camera.0.world_to_viewport(camera.1, caption.0) {
+            Ok(place) => {
+                node.display = Display::Flex;
+                node.left = px(place.x - 0.5 * size.size().x * size.inverse_scale_factor());
+                node.top = px(place.y);
+            }
+            Err(_) => node.display = Display::None,
+        }
+    }
+}
