@@ -71,7 +71,7 @@ fn main() -> AppExit {
     let args = Args::parse();
     App::new()
         .add_plugins(StudioPlugin { args: args.studio.clone(), title: "Vessels of the colon", help: controls::HELP })
-        .add_plugins((VesselPlugin { segments: bevy_vessels::render::SegmentRenderPlugin { sides: std::env::var("SIDES").map_or(8, |s| s.parse().unwrap()), cap_rings: std::env::var("CAPS").map_or(1, |s| s.parse().unwrap()) }, ..default() }, ControlsPlugin))
+        .add_plugins((VesselPlugin::default(), ControlsPlugin))
         .insert_resource(args)
         .add_systems(Startup, spawn_organ)
         .add_systems(Update, spawn_file.run_if(resource_exists::<OrganFile>))

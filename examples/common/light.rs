@@ -12,7 +12,7 @@ pub fn moist_tissue(tint: Color) -> StandardMaterial {
         alpha_mode: if tint.alpha() < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque },
         perceptual_roughness: 0.5,
         reflectance: 0.4,
-        clearcoat: if std::env::var("NOCC").is_err() {0.6} else {0.0},
+        clearcoat: if std::env::var("NOCC").is_err() { 0.6 } else { 0.0 },
         clearcoat_perceptual_roughness: 0.24,
         ..default()
     }
@@ -50,7 +50,7 @@ const HEAD_LIGHT: f32 = 260.0;
 fn spawn_lights(mut commands: Commands) {
     // A warm key light from the upper left, and a cool one from behind that draws the outline.
     let cascades = CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 4.0, ..default() }.build();
-    let key = DirectionalLight { color: Color::srgb(1.0, 0.96, 0.9), shadow_maps_enabled: std::env::var("NOSH").is_err(), ..default() };
+    let key = DirectionalLight { color: Color::srgb(1.0, 0.96, 0.9), shadow_maps_enabled: true, ..default() };
     let key_place = Transform::from_xyz(-1.4, 2.2, 2.2).looking_at(Vec3::ZERO, Vec3::Y);
     commands.spawn((key, key_place, cascades, RoomLight(8_000.0)));
     let edge = DirectionalLight { color: Color::srgb(0.72, 0.84, 1.0), ..default() };

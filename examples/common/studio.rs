@@ -105,7 +105,8 @@ fn has_display() -> bool {
 
 fn spawn_camera(mut commands: Commands, mut images: ResMut<Assets<Image>>, target: Option<Res<OffscreenTarget>>) {
     let projection = Projection::from(PerspectiveProjection { near: 0.002, ..default() });
-    let mut camera = commands.spawn((Camera3d::default(), IsDefaultUiCamera, projection, if std::env::var("NOMSAA").is_ok() {Msaa::Off} else {Msaa::Sample4}, camera_lights(&mut images)));
+    let mut camera =
+        commands.spawn((Camera3d::default(), IsDefaultUiCamera, projection, Msaa::Sample4, camera_lights(&mut images)));
     match target {
         Some(target) => camera.insert(bevy::camera::RenderTarget::from(target.0.clone())),
         None => camera.insert(PanOrbitCamera { button_pan: MouseButton::Right, ..default() }),
