@@ -1,3 +1,5 @@
+//! Arteries and veins grow over a sphere, while you watch: the ten lines of the README.
+
 use bevy::prelude::*;
 use bevy_vessels::prelude::*;
 

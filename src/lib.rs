@@ -69,7 +69,6 @@ pub mod prelude {
     pub use crate::synthesis::preset::PresetName;
     pub use crate::synthesis::roots::RootPlacement;
     pub use crate::synthesis::tissue::{TissueMode, TissueSettings};
-    pub use crate::synthesis::tree::System;
 }
 
 #[cfg(feature = "plugin")]

@@ -17,10 +17,10 @@ use bevy::{
     pbr::PbrPlugin,
     prelude::*,
     render::{
-        ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems,
+        ExtractSchedule, Render, RenderApp, RenderSystems,
         erased_render_asset::prepare_erased_assets,
         render_asset::prepare_assets,
-        render_resource::DownlevelFlags,
+        render_resource::{DownlevelFlags, WgpuLimits},
         renderer::{RenderAdapter, RenderDevice},
         storage::GpuShaderBuffer,
     },
@@ -35,7 +35,7 @@ pub use material::{SegmentExtension, SegmentMaterial, VesselMaterials};
 pub use segments::{SegmentBuffer, SegmentChunk};
 pub use template::{SEGMENTS_PER_CHUNK, chunk_mesh};
 
-use upload::{BuffersLost, SegmentWrites, extract_writes, note_new_device, write_segments_to_gpu};
+use upload::{SegmentWrites, extract_writes, write_segments_to_gpu};
 
 /// Draws the segments of all vessel entities.
 ///
@@ -81,7 +81,6 @@ impl Plugin for SegmentRenderPlugin {
         app.insert_resource(template)
             .init_resource::<VesselMaterials>()
             .init_resource::<SegmentWrites>()
-            .init_resource::<BuffersLost>()
             .add_observer(segments::detach_buffer)
             .configure_sets(
                 PostUpdate,
@@ -115,20 +114,15 @@ impl Plugin for SegmentRenderPlugin {
 
 fn build_render_app(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
-    render_app
-        .init_resource::<SegmentWrites>()
-        .init_resource::<BuffersLost>()
-        .add_systems(RenderStartup, note_new_device)
-        .add_systems(ExtractSchedule, extract_writes)
-        .add_systems(
-            Render,
-            // Bevy doesn't order materials after the buffers that they bind: one that grew must be there first, or its
-            // material would go on drawing from the old one
-            write_segments_to_gpu
-                .in_set(RenderSystems::PrepareAssets)
-                .after(prepare_assets::<GpuShaderBuffer>)
-                .before(prepare_erased_assets::<MeshMaterial3d<SegmentMaterial>>),
-        );
+    render_app.init_resource::<SegmentWrites>().add_systems(ExtractSchedule, extract_writes).add_systems(
+        Render,
+        // Bevy doesn't order materials after the buffers that they bind: one that grew must be there first, or its
+        // material would go on drawing from the old one
+        write_segments_to_gpu
+            .in_set(RenderSystems::PrepareAssets)
+            .after(prepare_assets::<GpuShaderBuffer>)
+            .before(prepare_erased_assets::<MeshMaterial3d<SegmentMaterial>>),
+    );
 }
 
 /// The systems that bring drawn segments up to date, in `PostUpdate`, before transforms are propagated.
@@ -147,11 +141,11 @@ pub struct SegmentLimits {
 
 impl SegmentLimits {
     /// `None` when the vertex stage can't read storage buffers.
-    fn new(limits: &bevy::render::render_resource::WgpuLimits, flags: DownlevelFlags) -> Option<Self> {
+    fn new(limits: &WgpuLimits, flags: DownlevelFlags) -> Option<Self> {
         if !flags.contains(DownlevelFlags::VERTEX_STORAGE) || limits.max_storage_buffers_per_shader_stage == 0 {
             return None;
         }
-        let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size as u64);
+        let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         // mesh tags and node indices are 32-bit
         let segments = (bytes / SegmentInstance::SIZE as u64).min(1 << 31) as usize;
         Some(Self { max_segments: segments - segments % SEGMENTS_PER_CHUNK })
@@ -160,5 +154,27 @@ impl SegmentLimits {
     /// Segments of one vessel entity that can be drawn: those that fit in a storage buffer.
     pub fn max_segments(&self) -> usize {
         self.max_segments
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_whole_chunks_that_fit_in_a_buffer() {
+        let device = WgpuLimits { max_storage_buffer_binding_size: 1 << 20, max_buffer_size: 1 << 30, ..default() };
+        let limits = SegmentLimits::new(&device, DownlevelFlags::all()).unwrap();
+        assert_eq!(limits.max_segments() % SEGMENTS_PER_CHUNK, 0);
+        let bytes = limits.max_segments() * SegmentInstance::SIZE;
+        assert!(bytes <= 1 << 20 && bytes > (1 << 20) - SEGMENTS_PER_CHUNK * SegmentInstance::SIZE);
+    }
+
+    #[test]
+    fn devices_without_storage_buffers_draw_nothing() {
+        let without_vertex_storage = DownlevelFlags::all() - DownlevelFlags::VERTEX_STORAGE;
+        assert!(SegmentLimits::new(&WgpuLimits::default(), without_vertex_storage).is_none());
+        let none = WgpuLimits::downlevel_webgl2_defaults();
+        assert!(SegmentLimits::new(&none, DownlevelFlags::all()).is_none());
     }
 }

@@ -4,7 +4,7 @@ use super::{
     SegmentLimits, SegmentTemplate,
     material::{SegmentExtension, SegmentMaterial, VesselMaterials},
     template::SEGMENTS_PER_CHUNK,
-    upload::{BuffersLost, SegmentWrite, SegmentWrites},
+    upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
     plugin::{SegmentChanges, SegmentColoring, VesselAppearance, VesselSystem, Vessels, VesselsOf},
@@ -16,7 +16,7 @@ use crate::{
 use bevy::{
     asset::RenderAssetUsages,
     camera::{primitives::Aabb, visibility::NoAutoAabb},
-    ecs::system::SystemParam,
+    ecs::{query::QueryData, system::SystemParam},
     math::bounding::Aabb3d,
     mesh::MeshTag,
     prelude::*,
@@ -144,44 +144,47 @@ pub(super) struct SegmentStore<'w, 's> {
     limits: Res<'w, SegmentLimits>,
 }
 
+/// A vessel entity that is drawn.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(super) struct DrawnVessels {
+    entity: Entity,
+    vessels: &'static Vessels,
+    system: &'static VesselSystem,
+    organ: &'static VesselsOf,
+    changes: &'static mut SegmentChanges,
+    segments: &'static mut SegmentBuffer,
+}
+
 /// Brings buffers, boxes and chunks up to date with trees and colours that changed.
 pub(super) fn update_segments(
-    mut vessels: Query<(Entity, &Vessels, &VesselSystem, &VesselsOf, &mut SegmentChanges, &mut SegmentBuffer)>,
+    mut drawn: Query<DrawnVessels>,
     appearances: Query<Ref<VesselAppearance>>,
-    mut lost: ResMut<BuffersLost>,
     mut store: SegmentStore,
 ) {
-    let everything = std::mem::take(&mut lost.bypass_change_detection().0);
-    for (entity, tree, system, organ, mut changes, mut segments) in &mut vessels {
-        let appearance = appearances.get(organ.0).ok();
-        let restyled = segments.look.is_none() || appearance.as_ref().is_some_and(Ref::is_changed);
-        if changes.is_empty() && !restyled && !everything {
+    for mut drawn in &mut drawn {
+        let appearance = appearances.get(drawn.organ.0).ok();
+        let restyled = drawn.segments.look.is_none() || appearance.as_ref().is_some_and(Ref::is_changed);
+        if drawn.changes.is_empty() && !restyled {
             continue;
         }
         let look = match appearance {
-            Some(appearance) => Look::new(&appearance, system.0),
-            None => Look::new(&VesselAppearance::default(), system.0),
+            Some(appearance) => Look::new(&appearance, drawn.system.0),
+            None => Look::new(&VesselAppearance::default(), drawn.system.0),
         };
-        let len = store.drawable(entity, tree.tree().len(), &mut segments);
-        let dirty = segments.dirty_chunks(tree, &changes, look, len, everything);
-        store.resize(&mut segments, len);
-        store.write(entity, tree, &mut segments, &dirty, len);
-        changes.bypass_change_detection().clear();
+        let len = store.drawable(drawn.entity, drawn.vessels.tree().len(), &mut drawn.segments);
+        let dirty = drawn.segments.dirty_chunks(drawn.vessels, &drawn.changes, look, len);
+        store.resize(&mut drawn.segments, len);
+        store.write(drawn.entity, drawn.vessels, &mut drawn.segments, &dirty, len);
+        drawn.changes.bypass_change_detection().clear();
     }
 }
 
 impl SegmentBuffer {
     /// Adopts the look and returns the chunks to be written, rising, all within `len` nodes.
-    fn dirty_chunks(
-        &mut self,
-        vessels: &Vessels,
-        changes: &SegmentChanges,
-        look: Look,
-        len: usize,
-        everything: bool,
-    ) -> Vec<usize> {
+    fn dirty_chunks(&mut self, vessels: &Vessels, changes: &SegmentChanges, look: Look, len: usize) -> Vec<usize> {
         let (tree, births) = (vessels.tree(), vessels.birth_steps());
-        if everything || self.look != Some(look) {
+        if self.look != Some(look) {
             self.look = Some(look);
             self.colors = look.colors();
             self.colors.refresh(tree, births, [0..tree.len()]);
@@ -224,9 +227,9 @@ impl SegmentStore<'_, '_> {
                 buffer.resize_in_place((segments.capacity * SegmentInstance::SIZE) as u64);
             }
             // a mutable look at the material makes its bind group anew, with the larger buffer
-            let _ = self.materials.get_mut(&segments.material).map(|mut material| {
+            if let Some(mut material) = self.materials.get_mut(&segments.material) {
                 material.extension.segments = segments.buffer.clone();
-            });
+            }
         }
         let needed = len.div_ceil(SEGMENTS_PER_CHUNK);
         for chunk in segments.chunks.drain(needed.min(segments.chunks.len())..) {

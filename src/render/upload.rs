@@ -29,34 +29,15 @@ pub(super) struct SegmentWrite {
 #[derive(Resource, Default)]
 pub(super) struct SegmentWrites(pub Vec<SegmentWrite>);
 
-/// Set when the render device was replaced: buffers are new and empty, and everything must be written again.
-#[derive(Resource, Default)]
-pub(super) struct BuffersLost(pub bool);
-
-/// Moves queued writes to the render world, and the news of a lost device the other way.
-pub(super) fn extract_writes(
-    mut main: ResMut<MainWorld>,
-    mut writes: ResMut<SegmentWrites>,
-    mut lost: ResMut<BuffersLost>,
-) {
-    if lost.0 {
-        main.resource_mut::<BuffersLost>().0 = true;
-        lost.0 = false;
-        writes.0.clear();
-    }
+/// Moves queued writes to the render world.
+pub(super) fn extract_writes(mut main: ResMut<MainWorld>, mut writes: ResMut<SegmentWrites>) {
     let mut queued = main.resource_mut::<SegmentWrites>();
     if !queued.0.is_empty() {
         writes.0.append(&mut queued.0);
     }
 }
 
-/// Runs once for each render device: at the first nothing is written yet, at any later one everything is gone.
-pub(super) fn note_new_device(mut lost: ResMut<BuffersLost>, mut devices: Local<u32>) {
-    lost.0 = *devices > 0;
-    *devices += 1;
-}
-
-/// Copies waiting segments into those buffers that exist; the others are tried again in the next frame.
+/// Copies waiting segments into those buffers that have room for them; the others are tried again in the next frame.
 pub(super) fn write_segments_to_gpu(
     mut writes: ResMut<SegmentWrites>,
     buffers: Res<RenderAssets<GpuShaderBuffer>>,
@@ -65,14 +46,21 @@ pub(super) fn write_segments_to_gpu(
     if writes.0.is_empty() {
         return;
     }
-    writes.0.retain(|write| {
-        let bytes: &[u8] = bytemuck::cast_slice(&write.segments);
-        let offset = (write.first * SegmentInstance::SIZE) as u64;
-        let Some(buffer) = buffers.get(&write.buffer) else { return true };
-        if offset + bytes.len() as u64 > buffer.buffer.size() {
-            return true;
+    let mut waiting = Vec::new();
+    writes.0.retain(|SegmentWrite { buffer, first, segments }| {
+        let bytes: &[u8] = bytemuck::cast_slice(segments);
+        let offset = (first * SegmentInstance::SIZE) as u64;
+        let room = buffers.get(buffer).filter(|gpu| offset + bytes.len() as u64 <= gpu.buffer.size());
+        match room {
+            // what was queued earlier is written earlier: a later write may replace parts of it
+            Some(gpu) if !waiting.contains(&buffer.id()) => {
+                queue.write_buffer(&gpu.buffer, offset, bytes);
+                false
+            }
+            _ => {
+                waiting.push(buffer.id());
+                true
+            }
         }
-        queue.write_buffer(&buffer.buffer, offset, bytes);
-        false
     });
 }

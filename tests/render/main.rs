@@ -11,14 +11,17 @@ mod stage;
 
 use bevy::{
     core_pipeline::prepass::{DeferredPrepass, DepthPrepass, MotionVectorPrepass, NormalPrepass},
+    log::LogPlugin,
     pbr::DefaultOpaqueRendererMethod,
     prelude::*,
 };
 use bevy_vessels::{
-    plugin::{SegmentChanges, SegmentColoring, Vessels},
-    render::{SEGMENTS_PER_CHUNK, SegmentBuffer, SegmentMaterial},
+    VesselPlugin,
+    plugin::{SegmentChanges, SegmentColoring, VesselAppearance, VesselSystem, Vessels, VesselsOf},
+    render::{SEGMENTS_PER_CHUNK, SegmentBuffer, SegmentLimits, SegmentMaterial},
     synthesis::tree::{NO_PARENT, System, VesselTree},
 };
+use headless::headless_plugins;
 use stage::{Picture, SIZE, on_stage};
 
 /// A tree of the given nodes: position, parent, radius.
@@ -323,6 +326,21 @@ fn users_can_change_the_material() {
         assert!(dimmed.brightness(64, 64) < 0.5 * plain.brightness(64, 64));
         assert!(dimmed.is_red(64, 64), "the base colour multiplies that of the segment");
     });
+}
+
+#[test]
+fn without_a_renderer_vessels_are_kept_and_nothing_is_drawn() {
+    let mut app = App::new();
+    app.add_plugins((headless_plugins(false).disable::<LogPlugin>(), VesselPlugin::default()));
+    app.finish();
+    app.cleanup();
+    let organ = app.world_mut().spawn((Transform::default(), Visibility::default(), VesselAppearance::default())).id();
+    let tree = Vessels::from_tree(&bar(), &[]);
+    let vessels = app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(System::Arterial), tree)).id();
+    app.update();
+    app.update();
+    assert!(app.world().get::<SegmentBuffer>(vessels).is_none());
+    assert!(!app.world().contains_resource::<SegmentLimits>());
 }
 
 /// The same outline, and about the same colours: lighting differs a little between ways of rendering.

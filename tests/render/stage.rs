@@ -42,13 +42,15 @@ const BACKGROUND: Color = Color::srgb(0.8, 0.8, 0.8);
 
 type Work = Box<dyn FnOnce(&mut Stage) + Send>;
 type Outcome = Result<(), Box<dyn Any + Send>>;
+/// A test's name, what it does, and where it waits for the end.
+type Job = (&'static str, Work, Sender<Outcome>);
 
 /// Runs a test on the stage, which is empty before and after; skips it where nothing can be drawn.
 pub fn on_stage(name: &'static str, test: impl FnOnce(&mut Stage) + Send + 'static) {
-    static STAGE: OnceLock<Option<Sender<(&'static str, Work, Sender<Outcome>)>>> = OnceLock::new();
+    static STAGE: OnceLock<Option<Sender<Job>>> = OnceLock::new();
     let stage = STAGE.get_or_init(|| {
         find_adapter()?;
-        let (sender, work) = channel::<(&'static str, Work, Sender<Outcome>)>();
+        let (sender, work) = channel::<Job>();
         thread::spawn(move || {
             let mut stage = Stage::new();
             for (name, test, done) in work {

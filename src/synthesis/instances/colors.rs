@@ -32,8 +32,8 @@ pub enum SegmentColors {
 }
 
 impl SegmentColors {
-    /// Number of orders that are told apart; higher ones share the last colour. Human arterial trees have 11 to 15.
-    pub const STRAHLER_LEVELS: u32 = 12;
+    /// Number of orders that are told apart; higher ones share the last colour. Grown trees have 6 to 9.
+    pub const STRAHLER_LEVELS: u32 = 9;
 
     /// Colours by radius, of a tree not yet seen.
     pub const RADIUS: Self = Self::Radius { thinnest: 0.0, widest: 0.0 };
@@ -126,10 +126,12 @@ fn differing_ranges(old: &[u32], new: &[u32]) -> Vec<Range<usize>> {
 
 const RAMP_LENGTH: usize = 256;
 
-/// The ramp from dark violet by red to light yellow, at `t` from 0 to 1, linear sRGB. Outside and NaN: the nearer end.
+/// The ramp from dark violet by teal to light yellow, at `t` from 0 to 1, linear sRGB. Outside: the nearer end; NaN: the
+/// first colour.
 ///
-/// A curve of constant speed in Oklab (Ottosson 2020): lightness and hue both rise evenly at one chroma, so equal steps
-/// of `t` look equally far apart, and order survives in grey and for colour-blind eyes, by lightness.
+/// A curve of constant speed in Oklab (Ottosson 2020): lightness rises and hue turns evenly at one chroma, so equal steps
+/// of `t` look equally far apart, and order survives in grey and for colour-blind eyes, by lightness. The hues are those
+/// that flesh doesn't have.
 pub fn ramp_color(t: f32) -> [f32; 3] {
     static RAMP: LazyLock<[[f32; 3]; RAMP_LENGTH]> =
         LazyLock::new(|| std::array::from_fn(|i| linear_srgb(oklab_on_ramp(i as f32 / (RAMP_LENGTH - 1) as f32))));
@@ -141,8 +143,8 @@ pub fn ramp_color(t: f32) -> [f32; 3] {
 /// Oklab lightness, green–red and blue–yellow coordinates on the ramp.
 fn oklab_on_ramp(t: f32) -> [f32; 3] {
     const LIGHTNESS: [f32; 2] = [0.40, 0.88];
-    const HUE_DEGREES: [f32; 2] = [-70.0, 100.0];
-    const CHROMA: f32 = 0.135;
+    const HUE_DEGREES: [f32; 2] = [300.0, 105.0];
+    const CHROMA: f32 = 0.105;
     let between = |ends: [f32; 2]| ends[0] + t * (ends[1] - ends[0]);
     let (sin, cos) = ops::sin_cos(between(HUE_DEGREES).to_radians());
     [between(LIGHTNESS), CHROMA * cos, CHROMA * sin]
