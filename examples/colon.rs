@@ -35,8 +35,10 @@ use common::{
     studio::{StudioArgs, StudioPlugin, View, front_view, moved, to_unit_size},
 };
 use endoscopy::{Lumen, look_inside};
-use organ_file::{OrganFile, OrganFiles};
+use organ_file::{OrganFile, OrganFilePlugin, OrganLoaded};
 use std::path::PathBuf;
+
+const MORE_HELP: &str = "N  next seed\nI  inside, up and down travel";
 
 /// Arteries and veins grow over a colon.
 #[derive(Parser, Resource, Clone)]
@@ -57,13 +59,6 @@ struct Args {
     mode: Mode,
 }
 
-impl Args {
-    /// The organ's tint: where vessels grow inside it, it is glass.
-    fn tint(&self, color: Color) -> Color {
-        if self.mode == Mode::Surface { color } else { color.with_alpha(0.25) }
-    }
-}
-
 #[derive(ValueEnum, Clone, Copy, PartialEq)]
 enum Mode {
     Surface,
@@ -73,29 +68,25 @@ enum Mode {
 
 fn main() -> AppExit {
     let args = Args::parse();
+    let title = "Vessels of the colon";
     App::new()
-        .add_plugins(StudioPlugin {
-            args: args.studio.clone(),
-            title: "Vessels of the colon",
-            help: HELP,
-            more_help: "N  next seed\nI  inside, up and down travel",
-        })
-        .add_plugins((VesselPlugin::default(), ControlsPlugin))
+        .add_plugins(StudioPlugin { args: args.studio.clone(), title, help: HELP, more_help: MORE_HELP })
+        .add_plugins((VesselPlugin::default(), ControlsPlugin, OrganFilePlugin))
         .insert_resource(args)
+        .add_observer(spawn_loaded)
         .add_systems(Startup, spawn_organ)
-        .add_systems(Update, spawn_file.run_if(resource_exists::<OrganFile>))
         .add_systems(Update, (next_seed, look_inside.after(tell)).run_if(resource_equals(View::Window)))
         .run()
 }
 
-fn spawn_organ(mut commands: Commands, args: Res<Args>, server: Res<AssetServer>) {
+fn spawn_organ(mut commands: Commands, args: Res<Args>) {
     match &args.mesh {
-        Some(path) => commands.insert_resource(OrganFile::load(path, &server)),
+        Some(path) => commands.insert_resource(OrganFile::new(path.clone())),
         None => commands.run_system_cached(spawn_colon),
     }
 }
 
-/// `N`: the next seed's colon takes the place of this one.
+/// `N`: the next seed's organ takes the place of this one.
 fn next_seed(
     keys: Res<ButtonInput<KeyCode>>,
     mut commands: Commands,
@@ -109,35 +100,43 @@ fn next_seed(
     }
 }
 
-/// The vessels that the arguments ask for, with their radii multiplied.
-fn vasculature(args: &Args, roots: Option<&RootSites>, radii: f32) -> Vasculature {
-    let mut wish = Vasculature::new(args.preset).with_seed(args.seed);
-    wish.tissue.mode = match args.mode {
-        Mode::Surface => TissueMode::Surface,
-        Mode::Volume => TissueMode::Volume,
-        Mode::Staged => TissueMode::Staged { surface_steps: wish.settings.steps / 2 },
-    };
-    for system in System::ALL {
-        wish.settings.system_mut(system).terminal_radius *= radii;
+impl Args {
+    /// The vessels that are asked for, with their radii multiplied.
+    fn vessels(&self, roots: Option<&RootSites>, radii: f32) -> Vasculature {
+        let mut wish = Vasculature::new(self.preset).with_seed(self.seed);
+        wish.tissue.mode = match self.mode {
+            Mode::Surface => TissueMode::Surface,
+            Mode::Volume => TissueMode::Volume,
+            Mode::Staged => TissueMode::Staged { surface_steps: wish.settings.steps / 2 },
+        };
+        System::ALL.into_iter().for_each(|system| wish.settings.system_mut(system).terminal_radius *= radii);
+        let Some(roots) = roots else { return wish };
+        wish.with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()))
     }
-    let Some(roots) = roots else { return wish };
-    wish.with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()))
+
+    /// The tint of the organ: glass, where vessels grow inside.
+    fn tint(&self, color: Color) -> Color {
+        if self.mode == Mode::Surface { color } else { color.with_alpha(0.16) }
+    }
 }
 
 /// The colon of the seed. Its outer and its inner side are organs of their own, joined by a rim.
 fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) -> Result {
     let colon = ColonSettings { seed: args.seed, triangles: 120_000, ..default() }.generate()?;
     let place = to_unit_size(colon.mesh.bounds());
-    let mut spawn = |name: &'static str, mesh: OrganMesh, wish: Option<Vasculature>| {
-        let mut organ = commands.spawn((Name::new(name), assets.organ(mesh.into(), args.tint(Color::WHITE), place)));
-        wish.map(|wish| organ.insert(wish));
+    let mut spawn = |name: &'static str, mesh: OrganMesh, vessels: Option<Vasculature>| {
+        let mut organ = assets.spawn(&mut commands, mesh.into(), args.tint(Color::WHITE), place);
+        organ.insert(Name::new(name));
+        vessels.map(|vessels| organ.insert(vessels));
     };
-    let outer = if args.mode != Mode::Surface { 0..colon.mesh.triangles.len() } else { colon.outer.clone() };
-    spawn("colon", colon.mesh.part(outer), Some(vasculature(&args, Some(&colon.roots), 1.4)));
+    let outside = args.vessels(Some(&colon.roots), 1.4);
     if args.mode == Mode::Surface {
+        spawn("colon", colon.mesh.part(colon.outer.clone()), Some(outside));
         spawn("rim", colon.mesh.part(colon.outer.end..colon.inner.start), None);
-        let mucosa = vasculature(&args, Some(&colon.inner_roots), 0.4);
-        spawn("mucosa", colon.mesh.part(colon.inner.clone()), Some(mucosa));
+        let inside = args.vessels(Some(&colon.inner_roots), 0.4);
+        spawn("mucosa", colon.mesh.part(colon.inner.clone()), Some(inside));
+    } else {
+        spawn("colon", colon.mesh.clone(), Some(outside));
     }
     let lumen = moved(&colon.lumen, &place);
     let line = colon.centre_line.iter().map(|&point| place.transform_point(point)).collect();
@@ -149,27 +148,17 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     Ok(())
 }
 
-/// The organ of a file, once it is there.
-fn spawn_file(
+/// The organ of a file.
+fn spawn_loaded(
+    loaded: On<OrganLoaded>,
     mut commands: Commands,
     args: Res<Args>,
-    file: Res<OrganFile>,
-    files: OrganFiles,
     mut assets: OrganAssets,
     mut shots: ResMut<Shots>,
-    mut exit: MessageWriter<AppExit>,
 ) {
-    let (mesh, place) = match files.mesh(&file, &assets.meshes) {
-        Ok(Some(found)) => found,
-        Ok(None) => return,
-        Err(error) => {
-            eprintln!("{error}");
-            exit.write(AppExit::error());
-            return;
-        }
-    };
-    let organ = assets.organ(mesh, args.tint(Color::srgb(0.79, 0.47, 0.42)), place);
-    commands.spawn((Name::new("organ"), organ, vasculature(&args, None, 1.4)));
-    commands.remove_resource::<OrganFile>();
+    let tint = args.tint(Color::srgb(0.74, 0.42, 0.37));
+    assets
+        .spawn(&mut commands, loaded.mesh.clone(), tint, loaded.place)
+        .insert((Name::new("organ"), args.vessels(None, 1.4)));
     shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 37.0, endoscope: false }];
 }

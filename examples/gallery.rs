@@ -72,9 +72,8 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         let place = Transform::from_xyz((index % 3) as f32 * 1.12 - 1.12, 0.6 - (index / 3) as f32 * 1.2, 0.0);
         let disc = Circle::new(0.5).mesh().resolution(160).build();
         let shows = |system| only.is_none_or(|only| only == system);
-        commands.spawn((
+        assets.spawn(&mut commands, disc, Color::srgb(0.93, 0.87, 0.82), place).insert((
             Name::new(preset.name()),
-            assets.organ(disc, Color::srgb(0.93, 0.87, 0.82), place),
             stouter(Vasculature::new(preset).with_seed(args.seed), 1.7),
             VesselAppearance {
                 show_arterial: shows(System::Arterial),
@@ -99,11 +98,10 @@ fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let mut wish = stouter(Vasculature::new(PresetName::Liver).with_seed(args.seed), 1.6);
     // Coarser than the preset, so that one can look through.
     wish.settings = wish.settings.scaled(1.5);
-    commands.spawn((
-        Name::new("liver"),
-        assets.organ(liver.mesh.into(), Color::srgba(1.0, 0.9, 0.85, 0.16), place),
-        wish.with_roots(arterial, venous),
-    ));
+    let glass = Color::srgba(1.0, 0.9, 0.85, 0.16);
+    assets
+        .spawn(&mut commands, liver.mesh.into(), glass, place)
+        .insert((Name::new("liver"), wish.with_roots(arterial, venous)));
     let view = moved(&liver.front, &place);
     shots.0.push(Shot { file: "liver.png", view, field_of_view: 36.0, endoscope: false });
     Ok(())
@@ -112,6 +110,7 @@ fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
 /// Captions stay below their discs wherever the camera is.
 fn place_captions(
     camera: Option<Single<(&Camera, &GlobalTransform), With<Camera3d>>>,
+    scale: Res<UiScale>,
     mut captions: Query<(&Caption, &ComputedNode, &mut Node)>,
 ) {
     let Some(camera) = camera else { return };
@@ -119,8 +118,8 @@ fn place_captions(
         match camera.0.world_to_viewport(camera.1, caption.0) {
             Ok(place) => {
                 node.display = Display::Flex;
-                node.left = px(place.x - 0.5 * size.size().x * size.inverse_scale_factor());
-                node.top = px(place.y);
+                node.left = px(place.x / scale.0 - 0.5 * size.size().x * size.inverse_scale_factor());
+                node.top = px(place.y / scale.0);
             }
             Err(_) => node.display = Display::None,
         }

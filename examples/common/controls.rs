@@ -4,7 +4,7 @@ use super::{
     light::moist_tissue,
     studio::{StatusLine, View},
 };
-use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, prelude::*};
+use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, light::NotShadowCaster, prelude::*};
 use bevy_vessels::{prelude::*, synthesis::tree::System};
 
 /// What the keys of [`ControlsPlugin`] do.
@@ -28,19 +28,27 @@ impl Plugin for ControlsPlugin {
 /// What organs are made of.
 #[derive(SystemParam)]
 pub struct OrganAssets<'w> {
-    /// Meshes, those of files included.
-    pub meshes: ResMut<'w, Assets<Mesh>>,
+    meshes: ResMut<'w, Assets<Mesh>>,
     materials: Option<ResMut<'w, Assets<StandardMaterial>>>,
 }
 
 impl OrganAssets<'_> {
-    /// The parts of an organ that are seen: its mesh, of moist tissue, tinted. A tint with an alpha below 1 lets the inside
-    /// show.
-    pub fn organ(&mut self, mesh: Mesh, tint: Color, place: Transform) -> impl Bundle + use<> {
+    /// Spawns what is seen of an organ: its mesh, of moist tissue, tinted. A tint with an alpha below 1 lets the inside show.
+    pub fn spawn<'a>(
+        &mut self,
+        commands: &'a mut Commands,
+        mesh: Mesh,
+        tint: Color,
+        place: Transform,
+    ) -> EntityCommands<'a> {
         let material = moist_tissue(tint);
         // Without a renderer there are no materials, and nobody looks.
         let material = self.materials.as_mut().map(|materials| materials.add(material)).unwrap_or_default();
-        (Organ, Mesh3d(self.meshes.add(mesh)), MeshMaterial3d(material), place)
+        let mut organ = commands.spawn((Organ, Mesh3d(self.meshes.add(mesh)), MeshMaterial3d(material), place));
+        if tint.alpha() < 1.0 {
+            organ.insert(NotShadowCaster);
+        }
+        organ
     }
 }
 

@@ -3,106 +3,125 @@
 use crate::common::studio::to_unit_size;
 use bevy::{
     asset::LoadState,
+    ecs::system::SystemParam,
     gltf::{Gltf, GltfMesh, GltfNode},
-    mesh::{Indices, PrimitiveTopology, VertexAttributeValues},
+    mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
-use std::path::Path;
+use bevy_vessels::{plugin::read_mesh, synthesis::mesh::TriangleMesh};
+use std::path::PathBuf;
 
-/// An organ's file on its way.
-#[derive(Resource)]
-pub struct OrganFile(Handle<Gltf>);
+/// Loads an organ's file when there is an [`OrganFile`], and triggers [`OrganLoaded`]. A file that is no organ ends the app.
+pub struct OrganFilePlugin;
 
-impl OrganFile {
-    /// Begins to load a file. Whether it is there, and an organ, shows in [`OrganFiles::mesh`].
-    pub fn load(path: &Path, server: &AssetServer) -> Self {
-        Self(server.load(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())))
+impl Plugin for OrganFilePlugin {
+    fn build(&self, app: &mut App) {
+        app.add_systems(Update, load.run_if(resource_exists::<OrganFile>));
     }
 }
 
+/// An organ's file on its way.
+#[derive(Resource)]
+pub struct OrganFile {
+    /// Where it is.
+    pub path: PathBuf,
+    handle: Option<Handle<Gltf>>,
+}
+
+impl OrganFile {
+    /// Wishes for a file.
+    pub fn new(path: PathBuf) -> Self {
+        Self { path, handle: None }
+    }
+}
+
+/// An organ is there.
+#[derive(Event)]
+pub struct OrganLoaded {
+    /// All its triangles.
+    pub mesh: Mesh,
+    /// What makes it one unit large.
+    pub place: Transform,
+}
+
 /// What is in the files that are loaded.
-#[derive(bevy::ecs::system::SystemParam)]
-pub struct OrganFiles<'w> {
+#[derive(SystemParam)]
+struct Files<'w> {
     server: Res<'w, AssetServer>,
     files: Res<'w, Assets<Gltf>>,
     nodes: Res<'w, Assets<GltfNode>>,
     parts: Res<'w, Assets<GltfMesh>>,
+    meshes: Res<'w, Assets<Mesh>>,
 }
 
-impl OrganFiles<'_> {
-    /// All triangles of a file as one mesh with the transform that makes it one unit large, `None` while it is on its way.
-    ///
-    /// # Errors
-    /// The file isn't glTF, or has no triangles.
-    pub fn mesh(&self, file: &OrganFile, meshes: &Assets<Mesh>) -> Result<Option<(Mesh, Transform)>, String> {
-        if let LoadState::Failed(error) = self.server.load_state(&file.0) {
-            return Err(error.to_string());
+fn load(mut commands: Commands, mut file: ResMut<OrganFile>, files: Files, mut exit: MessageWriter<AppExit>) {
+    let path = std::path::absolute(&file.path).unwrap_or_else(|_| file.path.clone());
+    let handle = file.handle.get_or_insert_with(|| files.server.load(path));
+    match files.organ(handle) {
+        Ok(None) => return,
+        Ok(Some(loaded)) => commands.trigger(loaded),
+        Err(error) => {
+            eprintln!("{}: {error}", file.path.display());
+            exit.write(AppExit::error());
         }
-        if !self.server.is_loaded_with_dependencies(&file.0) {
+    }
+    commands.remove_resource::<OrganFile>();
+}
+
+impl Files<'_> {
+    /// All triangles of a file as one mesh, `None` while it is on its way.
+    fn organ(&self, file: &Handle<Gltf>) -> Result<Option<OrganLoaded>> {
+        if let LoadState::Failed(error) = self.server.load_state(file) {
+            return Err(error.into());
+        }
+        let Some(gltf) = self.files.get(file).filter(|_| self.server.is_loaded_with_dependencies(file)) else {
             return Ok(None);
+        };
+        let children: Vec<_> = self.nodes_of(&gltf.nodes).flat_map(|node| &node.children).collect();
+        let mut triangles = Triangles::default();
+        for root in gltf.nodes.iter().filter(|node| !children.contains(node)) {
+            self.collect(root, GlobalTransform::IDENTITY, &mut triangles)?;
         }
-        let Some(gltf) = self.files.get(&file.0) else { return Ok(None) };
-        let mut all = Triangles::default();
-        let nodes: Vec<&GltfNode> = gltf.nodes.iter().filter_map(|node| self.nodes.get(node)).collect();
-        let is_child =
-            |node: &GltfNode| nodes.iter().any(|other| other.children.iter().any(|child| self.is(child, node)));
-        for node in nodes.iter().filter(|node| !is_child(node)) {
-            self.collect(node, meshes, GlobalTransform::IDENTITY, &mut all);
-        }
-        if all.indices.is_empty() {
-            return Err("the file has no triangles".into());
-        }
-        let place = to_unit_size(all.bounds());
-        Ok(Some((all.into_mesh(), place)))
+        triangles.into_organ().map(Some)
     }
 
-    fn is(&self, handle: &Handle<GltfNode>, node: &GltfNode) -> bool {
-        self.nodes.get(handle).is_some_and(|found| found.index == node.index)
+    fn nodes_of<'a>(&'a self, nodes: &'a [Handle<GltfNode>]) -> impl Iterator<Item = &'a GltfNode> {
+        nodes.iter().filter_map(|node| self.nodes.get(node))
     }
 
-    fn collect(&self, node: &GltfNode, meshes: &Assets<Mesh>, parent: GlobalTransform, all: &mut Triangles) {
+    fn collect(&self, node: &Handle<GltfNode>, parent: GlobalTransform, all: &mut Triangles) -> Result {
+        let Some(node) = self.nodes.get(node) else { return Ok(()) };
         let place = parent.mul_transform(node.transform);
-        let primitives =
-            node.mesh.as_ref().and_then(|mesh| self.parts.get(mesh)).map_or(&[][..], |mesh| &mesh.primitives);
-        for mesh in primitives.iter().filter_map(|primitive| meshes.get(&primitive.mesh)) {
-            all.add(mesh, place);
+        let mesh = node.mesh.as_ref().and_then(|mesh| self.parts.get(mesh));
+        for primitive in mesh.iter().flat_map(|mesh| &mesh.primitives) {
+            if let Some(mesh) = self.meshes.get(&primitive.mesh) {
+                all.add(&read_mesh(mesh)?, place);
+            }
         }
-        for child in node.children.iter().filter_map(|child| self.nodes.get(child)) {
-            self.collect(child, meshes, place, all);
-        }
+        node.children.iter().try_for_each(|child| self.collect(child, place, all))
     }
 }
 
 #[derive(Default)]
 struct Triangles {
-    positions: Vec<[f32; 3]>,
-    indices: Vec<u32>,
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
 }
 
 impl Triangles {
-    fn add(&mut self, mesh: &Mesh, place: GlobalTransform) {
-        let (Some(VertexAttributeValues::Float32x3(positions)), PrimitiveTopology::TriangleList) =
-            (mesh.attribute(Mesh::ATTRIBUTE_POSITION), mesh.primitive_topology())
-        else {
-            return;
-        };
+    fn add(&mut self, mesh: &TriangleMesh, place: GlobalTransform) {
         let first = self.positions.len() as u32;
-        self.positions.extend(positions.iter().map(|point| place.transform_point(Vec3::from(*point)).to_array()));
-        match mesh.indices() {
-            Some(indices) => self.indices.extend(indices.iter().map(|index| first + index as u32)),
-            None => self.indices.extend(first..self.positions.len() as u32),
-        }
+        self.positions.extend(mesh.positions().iter().map(|&point| place.transform_point(point)));
+        self.triangles.extend(mesh.triangles().iter().map(|corners| corners.map(|corner| first + corner)));
     }
 
-    fn bounds(&self) -> (Vec3, Vec3) {
-        let points = self.positions.iter().map(|point| Vec3::from(*point)).filter(|point| point.is_finite());
-        points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)))
-    }
-
-    fn into_mesh(self) -> Mesh {
-        Mesh::new(PrimitiveTopology::TriangleList, default())
-            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, self.positions)
-            .with_inserted_indices(Indices::U32(self.indices))
-            .with_computed_smooth_normals()
+    fn into_organ(self) -> Result<OrganLoaded> {
+        let organ = TriangleMesh::new(self.positions, self.triangles, None)?;
+        let bounds = organ.bounds();
+        let mesh = Mesh::new(PrimitiveTopology::TriangleList, default())
+            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, organ.positions().to_vec())
+            .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, organ.vertex_normals())
+            .with_inserted_indices(Indices::U32(organ.triangles().iter().flatten().copied().collect()));
+        Ok(OrganLoaded { mesh, place: to_unit_size((bounds.min.into(), bounds.max.into())) })
     }
 }

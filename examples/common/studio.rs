@@ -99,10 +99,13 @@ impl StudioPlugin {
             None => println!("{HOW_TO_GET_PICTURES}"),
         }
         // A software driver is no news here, and nor are cameras without a window.
-        let log = LogPlugin { filter: "warn,bevy_render=error,bevy_light=error,wgpu=error".into(), ..default() };
+        let render = if adapter.is_some() { "error" } else { "off" };
+        let filter = format!("warn,bevy_render={render},bevy_light=error,bevy_gltf=error,wgpu=error");
+        let log = LogPlugin { filter, ..default() };
         app.add_plugins(headless_plugins(adapter.is_some()).set(log).set(any_file()));
         if adapter.is_some() {
-            app.add_plugins(OffscreenPlugin { size: self.args.picture_size() * OVERSAMPLING });
+            app.insert_resource(UiScale(OVERSAMPLING as f32))
+                .add_plugins(OffscreenPlugin { size: self.args.picture_size() * OVERSAMPLING });
         }
         app.add_plugins(PhotoPlugin);
         if adapter.is_some() { View::Pictures } else { View::Nothing }
@@ -140,7 +143,7 @@ fn spawn_camera(
 
 /// A view of an organ of unit size from the front.
 pub fn front_view() -> Viewpoint {
-    Viewpoint { eye: Vec3::new(0.1, 0.1, 1.5), target: Vec3::ZERO, up: Vec3::Y }
+    Viewpoint { eye: Vec3::new(0.15, 0.12, 1.8), target: Vec3::ZERO, up: Vec3::Y }
 }
 
 /// Where a camera stands for a view.
