@@ -1,3 +1,5 @@
+//! The README's ten lines: vessels over a ball.
+
 use bevy::prelude::*;
 use bevy_vessels::prelude::*;
 
