@@ -124,7 +124,7 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         wish.map(|wish| organ.insert(wish));
     };
     let outer = if args.mode != Mode::Surface { 0..colon.mesh.triangles.len() } else { colon.outer.clone() };
-    spawn("colon", colon.mesh.part(outer), Some(vasculature(&args, Some(&colon.roots), 1.0)));
+    spawn("colon", colon.mesh.part(outer), Some(vasculature(&args, Some(&colon.roots), 1.4)));
     if args.mode == Mode::Surface {
         spawn("rim", colon.mesh.part(colon.outer.end..colon.inner.start), None);
         let mucosa = vasculature(&args, Some(&colon.inner_roots), 0.4);
@@ -160,7 +160,7 @@ fn spawn_file(
         }
     };
     let organ = assets.organ(mesh, args.tint(Color::srgb(0.79, 0.47, 0.42)), place);
-    commands.spawn((Name::new("organ"), organ, vasculature(&args, None, 1.0)));
+    commands.spawn((Name::new("organ"), organ, vasculature(&args, None, 1.4)));
     commands.remove_resource::<OrganFile>();
     shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 42.0, endoscope: false }];
 }

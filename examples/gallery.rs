@@ -37,11 +37,13 @@ struct Args {
 const DISCS: [(&str, PresetName, Option<System>); 6] = [
     ("arteries", PresetName::Paper, Some(System::Arterial)),
     ("veins", PresetName::Paper, Some(System::Venous)),
-    ("larger \u{3ba}: wider angles", PresetName::WideAngles, Some(System::Arterial)),
-    ("larger \u{3c9}: straighter", PresetName::Straight, Some(System::Arterial)),
-    ("smaller \u{3c6}: symmetric", PresetName::Symmetric, Some(System::Arterial)),
-    ("larger \u{3c6}: lateral branches", PresetName::Lateral, Some(System::Arterial)),
+    ("wider angles", PresetName::WideAngles, Some(System::Arterial)),
+    ("straighter", PresetName::Straight, Some(System::Arterial)),
+    ("more symmetric", PresetName::Symmetric, Some(System::Arterial)),
+    ("more lateral", PresetName::Lateral, Some(System::Arterial)),
 ];
+/// What radii are multiplied by in the pictures.
+const STOUTNESS: f32 = 2.5;
 /// Where the liver is, beside the discs.
 const LIVER: Vec3 = Vec3::new(3.2, 0.0, 0.0);
 
@@ -66,9 +68,9 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         let disc = Circle::new(0.5).mesh().resolution(160).build();
         let shows = |system| only.is_none_or(|only| only == system);
         commands.spawn((
-            Name::new(caption),
+            Name::new(caption.replace(' ', "_")),
             assets.organ(disc, Color::srgb(0.93, 0.87, 0.82), place),
-            Vasculature::new(preset).with_seed(args.seed),
+            stout(Vasculature::new(preset).with_seed(args.seed)),
             VesselAppearance {
                 show_arterial: shows(System::Arterial),
                 show_venous: shows(System::Venous),
@@ -83,6 +85,14 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     shots.0.push(Shot { file: "discs.png", view, field_of_view: 46.0, endoscope: false });
 }
 
+/// Thicker vessels, for a picture of this size: Murray's law keeps their ratios.
+fn stout(mut wish: Vasculature) -> Vasculature {
+    for system in System::ALL {
+        wish.settings.system_mut(system).terminal_radius *= STOUTNESS;
+    }
+    wish
+}
+
 fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) -> Result {
     let liver = LiverSettings { seed: args.seed, ..default() }.generate()?;
     let place = to_unit_size(liver.mesh.bounds());
@@ -92,7 +102,7 @@ fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     commands.spawn((
         Name::new("liver"),
         assets.organ(liver.mesh.into(), Color::srgba(1.0, 0.8, 0.75, 0.22), place),
-        Vasculature::new(PresetName::Liver).with_seed(args.seed).with_roots(arterial, venous),
+        stout(Vasculature::new(PresetName::Liver).with_seed(args.seed).with_roots(arterial, venous)),
     ));
     let view = moved(&liver.front, &place);
     shots.0.push(Shot { file: "liver.png", view, field_of_view: 36.0, endoscope: false });

@@ -1,4 +1,4 @@
-//! The README's ten lines: vessels over a ball.
+//! Arteries and veins grow over a sphere, while you watch: the ten lines of the README.
 
 use bevy::prelude::*;
 use bevy_vessels::prelude::*;

@@ -12,7 +12,7 @@ pub fn moist_tissue(tint: Color) -> StandardMaterial {
         alpha_mode: if tint.alpha() < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque },
         perceptual_roughness: 0.5,
         reflectance: 0.4,
-        clearcoat: if std::env::var("NOCC").is_err() { 0.6 } else { 0.0 },
+        clearcoat: 0.6,
         clearcoat_perceptual_roughness: 0.24,
         ..default()
     }

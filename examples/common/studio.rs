@@ -3,9 +3,14 @@
 use super::{
     headless::{HOW_TO_GET_PICTURES, OffscreenPlugin, OffscreenTarget, find_adapter, headless_plugins},
     light::{LightPlugin, camera_lights},
-    photo::PhotoPlugin,
+    photo::{OVERSAMPLING, PhotoPlugin},
 };
-use bevy::{asset::UnapprovedPathMode, log::LogPlugin, prelude::*};
+use bevy::{
+    asset::UnapprovedPathMode,
+    camera::{RenderTarget, Viewport},
+    log::LogPlugin,
+    prelude::*,
+};
 use bevy_panorbit_camera::{PanOrbitCamera, PanOrbitCameraPlugin};
 use bevy_vessels::synthesis::organ::Viewpoint;
 use std::path::PathBuf;
@@ -25,6 +30,12 @@ pub struct StudioArgs {
     /// Width and height of the pictures, in pixels.
     #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"], default_values_t = [1280, 960])]
     pub size: Vec<u32>,
+}
+
+impl StudioArgs {
+    fn picture_size(&self) -> UVec2 {
+        UVec2::new(self.size[0], self.size[1]).clamp(UVec2::splat(16), UVec2::splat(4096))
+    }
 }
 
 /// Bevy with a window, or without, and everything needed to see an organ of about one unit at the origin.
@@ -87,7 +98,7 @@ impl StudioPlugin {
         let log = LogPlugin { filter: "warn,bevy_render=error,bevy_light=error,wgpu=error".into(), ..default() };
         app.add_plugins(headless_plugins(adapter.is_some()).set(log).set(any_file()));
         if adapter.is_some() {
-            app.add_plugins(OffscreenPlugin { size: UVec2::new(self.args.size[0].max(16), self.args.size[1].max(16)) });
+            app.add_plugins(OffscreenPlugin { size: self.args.picture_size() * OVERSAMPLING });
         }
         app.add_plugins(PhotoPlugin);
         if adapter.is_some() { View::Pictures } else { View::Nothing }
@@ -103,13 +114,27 @@ fn has_display() -> bool {
     !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 
-fn spawn_camera(mut commands: Commands, mut images: ResMut<Assets<Image>>, target: Option<Res<OffscreenTarget>>) {
+fn spawn_camera(
+    mut commands: Commands,
+    mut images: ResMut<Assets<Image>>,
+    args: Res<StudioArgs>,
+    target: Option<Res<OffscreenTarget>>,
+) {
     let projection = Projection::from(PerspectiveProjection { near: 0.002, ..default() });
+<<<<<<< HEAD
+    let mut camera = commands.spawn((Camera3d::default(), IsDefaultUiCamera, projection, camera_lights(&mut images)));
+=======
     let mut camera =
         commands.spawn((Camera3d::default(), IsDefaultUiCamera, projection, Msaa::Sample4, camera_lights(&mut images)));
+>>>>>>> main
     match target {
-        Some(target) => camera.insert(bevy::camera::RenderTarget::from(target.0.clone())),
-        None => camera.insert(PanOrbitCamera { button_pan: MouseButton::Right, ..default() }),
+        // Growing vessels are drawn small; the pictures use the whole target.
+        Some(target) => {
+            let viewport = Viewport { physical_size: args.picture_size(), ..default() };
+            let camera_to_image = Camera { viewport: Some(viewport), ..default() };
+            camera.insert((camera_to_image, RenderTarget::from(target.0.clone()), Msaa::Off))
+        }
+        None => camera.insert((PanOrbitCamera { button_pan: MouseButton::Right, ..default() }, Msaa::Sample4)),
     };
     camera.insert(transform_of(&front_view()));
 }
