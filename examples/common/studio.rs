@@ -121,12 +121,7 @@ fn spawn_camera(
     target: Option<Res<OffscreenTarget>>,
 ) {
     let projection = Projection::from(PerspectiveProjection { near: 0.002, ..default() });
-<<<<<<< HEAD
     let mut camera = commands.spawn((Camera3d::default(), IsDefaultUiCamera, projection, camera_lights(&mut images)));
-=======
-    let mut camera =
-        commands.spawn((Camera3d::default(), IsDefaultUiCamera, projection, Msaa::Sample4, camera_lights(&mut images)));
->>>>>>> main
     match target {
         // Growing vessels are drawn small; the pictures use the whole target.
         Some(target) => {
