@@ -15,6 +15,10 @@
 //! where there is no display: `cargo run --release --example colon -- --headless --out DIR`.
 
 mod common;
+#[path = "common/endoscopy.rs"]
+mod endoscopy;
+#[path = "common/organ_file.rs"]
+mod organ_file;
 
 use bevy::prelude::*;
 use bevy_vessels::{
@@ -26,12 +30,12 @@ use bevy_vessels::{
 };
 use clap::{Parser, ValueEnum};
 use common::{
-    controls::{self, ControlsPlugin, Organ, OrganAssets},
-    endoscopy::Lumen,
-    organ_file::{OrganFile, OrganFiles},
+    controls::{ControlsPlugin, HELP, Organ, OrganAssets, tell},
     photo::{Shot, Shots},
     studio::{StudioArgs, StudioPlugin, View, front_view, moved, to_unit_size},
 };
+use endoscopy::{Lumen, look_inside};
+use organ_file::{OrganFile, OrganFiles};
 use std::path::PathBuf;
 
 /// Arteries and veins grow over a colon.
@@ -70,12 +74,17 @@ enum Mode {
 fn main() -> AppExit {
     let args = Args::parse();
     App::new()
-        .add_plugins(StudioPlugin { args: args.studio.clone(), title: "Vessels of the colon", help: controls::HELP })
+        .add_plugins(StudioPlugin {
+            args: args.studio.clone(),
+            title: "Vessels of the colon",
+            help: HELP,
+            more_help: "N  next seed\nI  inside, up and down travel",
+        })
         .add_plugins((VesselPlugin::default(), ControlsPlugin))
         .insert_resource(args)
         .add_systems(Startup, spawn_organ)
         .add_systems(Update, spawn_file.run_if(resource_exists::<OrganFile>))
-        .add_systems(Update, next_seed.run_if(resource_equals(View::Window)))
+        .add_systems(Update, (next_seed, look_inside.after(tell)).run_if(resource_equals(View::Window)))
         .run()
 }
 
@@ -134,7 +143,7 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let line = colon.centre_line.iter().map(|&point| place.transform_point(point)).collect();
     commands.insert_resource(Lumen::new(line, lumen.eye));
     shots.0 = vec![
-        Shot { file: "colon.png", view: moved(&colon.front, &place), field_of_view: 42.0, endoscope: false },
+        Shot { file: "colon.png", view: moved(&colon.front, &place), field_of_view: 37.0, endoscope: false },
         Shot { file: "colon_inside.png", view: lumen, field_of_view: 78.0, endoscope: true },
     ];
     Ok(())
@@ -162,5 +171,5 @@ fn spawn_file(
     let organ = assets.organ(mesh, args.tint(Color::srgb(0.79, 0.47, 0.42)), place);
     commands.spawn((Name::new("organ"), organ, vasculature(&args, None, 1.4)));
     commands.remove_resource::<OrganFile>();
-    shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 42.0, endoscope: false }];
+    shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 37.0, endoscope: false }];
 }

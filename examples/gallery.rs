@@ -18,7 +18,7 @@ use bevy_vessels::{
 };
 use clap::Parser;
 use common::{
-    controls::{self, ControlsPlugin, OrganAssets},
+    controls::{ControlsPlugin, HELP, OrganAssets},
     photo::{Shot, Shots},
     studio::{StudioArgs, StudioPlugin, moved, to_unit_size},
 };
@@ -37,10 +37,10 @@ struct Args {
 const DISCS: [(&str, PresetName, Option<System>); 6] = [
     ("arteries", PresetName::Paper, Some(System::Arterial)),
     ("veins", PresetName::Paper, Some(System::Venous)),
-    ("wider angles", PresetName::WideAngles, Some(System::Arterial)),
-    ("straighter", PresetName::Straight, Some(System::Arterial)),
-    ("more symmetric", PresetName::Symmetric, Some(System::Arterial)),
-    ("more lateral", PresetName::Lateral, Some(System::Arterial)),
+    ("larger kappa: wider angles", PresetName::WideAngles, Some(System::Arterial)),
+    ("larger omega: straighter", PresetName::Straight, Some(System::Arterial)),
+    ("smaller phi: symmetric", PresetName::Symmetric, Some(System::Arterial)),
+    ("larger phi: lateral branches", PresetName::Lateral, Some(System::Arterial)),
 ];
 /// What radii are multiplied by in the pictures.
 const STOUTNESS: f32 = 2.5;
@@ -50,12 +50,20 @@ const LIVER: Vec3 = Vec3::new(3.2, 0.0, 0.0);
 fn main() -> AppExit {
     let args = Args::parse();
     App::new()
-        .add_plugins(StudioPlugin { args: args.studio.clone(), title: "Presets", help: controls::HELP })
+        .add_plugins(StudioPlugin { args: args.studio.clone(), title: "Presets", help: HELP, more_help: "" })
         .add_plugins((VesselPlugin::default(), ControlsPlugin))
         .insert_resource(args)
         .add_systems(Startup, (spawn_discs, spawn_liver).chain())
         .add_systems(PostUpdate, place_captions.after(TransformSystems::Propagate))
         .run()
+}
+
+/// Vessels with their radii multiplied, so that they show from afar.
+fn stouter(mut wish: Vasculature, radii: f32) -> Vasculature {
+    for system in System::ALL {
+        wish.settings.system_mut(system).terminal_radius *= radii;
+    }
+    wish
 }
 
 /// A line of text below a place in the world.
@@ -68,9 +76,9 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         let disc = Circle::new(0.5).mesh().resolution(160).build();
         let shows = |system| only.is_none_or(|only| only == system);
         commands.spawn((
-            Name::new(caption.replace(' ', "_")),
+            Name::new(preset.name()),
             assets.organ(disc, Color::srgb(0.93, 0.87, 0.82), place),
-            stout(Vasculature::new(preset).with_seed(args.seed)),
+            stouter(Vasculature::new(preset).with_seed(args.seed), 1.7),
             VesselAppearance {
                 show_arterial: shows(System::Arterial),
                 show_venous: shows(System::Venous),
@@ -99,10 +107,13 @@ fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let place = place.with_translation(place.translation + LIVER);
     let roots = [&liver.roots.arterial, &liver.roots.venous].map(|sites| RootPlacement::Nearest(sites.clone()));
     let [arterial, venous] = roots;
+    let mut wish = stouter(Vasculature::new(PresetName::Liver).with_seed(args.seed), 1.6);
+    // Coarser than the preset, so that one can look through.
+    wish.settings = wish.settings.scaled(1.5);
     commands.spawn((
         Name::new("liver"),
-        assets.organ(liver.mesh.into(), Color::srgba(1.0, 0.8, 0.75, 0.22), place),
-        stout(Vasculature::new(PresetName::Liver).with_seed(args.seed).with_roots(arterial, venous)),
+        assets.organ(liver.mesh.into(), Color::srgba(1.0, 0.9, 0.85, 0.16), place),
+        wish.with_roots(arterial, venous),
     ));
     let view = moved(&liver.front, &place);
     shots.0.push(Shot { file: "liver.png", view, field_of_view: 36.0, endoscope: false });

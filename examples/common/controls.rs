@@ -1,7 +1,6 @@
 //! Keys that steer every organ of an example, and the line that tells how far they are.
 
 use super::{
-    endoscopy::look_inside,
     light::moist_tissue,
     studio::{StatusLine, View},
 };
@@ -9,7 +8,7 @@ use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, pre
 use bevy_vessels::{prelude::*, synthesis::tree::System};
 
 /// What the keys of [`ControlsPlugin`] do.
-pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours\nI  inside, up and down travel";
+pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours";
 
 /// An organ on show, vessels or none.
 #[derive(Component)]
@@ -22,7 +21,7 @@ impl Plugin for ControlsPlugin {
     fn build(&self, app: &mut App) {
         let in_window = resource_exists_and_equals(View::Window);
         app.add_plugins(FrameTimeDiagnosticsPlugin::default())
-            .add_systems(Update, (steer, show, tell, look_inside).chain().run_if(in_window));
+            .add_systems(Update, (steer, show, tell).chain().run_if(in_window));
     }
 }
 
@@ -77,7 +76,8 @@ fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>
     }
 }
 
-fn tell(
+/// Tells how far the growth is.
+pub fn tell(
     organs: Query<(&Vasculature, &GrowthProgress, &GrowthControl)>,
     diagnostics: Res<bevy::diagnostic::DiagnosticsStore>,
     mut status: ResMut<StatusLine>,

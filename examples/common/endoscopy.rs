@@ -1,6 +1,6 @@
 //! Looking at an organ from within: the camera travels along a line, and carries the only light.
 
-use super::{light::Endoscope, studio::StatusLine};
+use crate::common::{light::Endoscope, studio::StatusLine};
 use bevy::prelude::*;
 use bevy_panorbit_camera::PanOrbitCamera;
 

@@ -1,9 +1,7 @@
 //! What the examples share: a studio to look at organs in, with a window or without.
 
 pub mod controls;
-pub mod endoscopy;
 pub mod headless;
 pub mod light;
-pub mod organ_file;
 pub mod photo;
 pub mod studio;

@@ -1,6 +1,6 @@
 //! Organs from glTF files, whatever parts and unit they come in.
 
-use super::studio::to_unit_size;
+use crate::common::studio::to_unit_size;
 use bevy::{
     asset::LoadState,
     gltf::{Gltf, GltfMesh, GltfNode},

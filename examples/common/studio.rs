@@ -46,6 +46,8 @@ pub struct StudioPlugin {
     pub title: &'static str,
     /// What the keys do, one line each.
     pub help: &'static str,
+    /// What the keys of this example alone do.
+    pub more_help: &'static str,
 }
 
 /// Whether there is a window.
@@ -64,12 +66,14 @@ pub enum View {
 pub struct StatusLine(pub String);
 
 #[derive(Resource)]
-struct Help(&'static str);
+struct Help(String);
 
 impl Plugin for StudioPlugin {
     fn build(&self, app: &mut App) {
         let view = if self.args.headless || !has_display() { self.add_headless(app) } else { self.add_window(app) };
-        app.insert_resource(view).insert_resource(self.args.clone()).insert_resource(Help(self.help));
+        app.insert_resource(view)
+            .insert_resource(self.args.clone())
+            .insert_resource(Help(format!("{}\n{}", self.help, self.more_help)));
         app.init_resource::<StatusLine>();
         if view != View::Nothing {
             app.add_plugins(LightPlugin).add_systems(Startup, spawn_camera);
@@ -162,7 +166,7 @@ fn spawn_texts(mut commands: Commands, help: Res<Help>) {
     let font = TextFont { font_size: FontSize::Px(14.0), ..default() };
     let node = |bottom, top| Node { position_type: PositionType::Absolute, left: px(12), bottom, top, ..default() };
     let color = TextColor(Color::srgba(1.0, 1.0, 1.0, 0.75));
-    commands.spawn((Text::new(help.0), font.clone(), color, node(auto(), px(12))));
+    commands.spawn((Text::new(&help.0), font.clone(), color, node(auto(), px(12))));
     commands.spawn((Text::default(), font, color, node(px(12), auto()), StatusText));
 }
 
