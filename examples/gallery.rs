@@ -5,7 +5,6 @@
 //!
 //! Keys as on the screen. `--headless --out DIR` writes `discs.png` and `liver.png`.
 
-#[expect(dead_code, reason = "the colon alone takes files and looks inside")]
 mod common;
 
 use bevy::prelude::*;
@@ -42,8 +41,6 @@ const DISCS: [(&str, PresetName, Option<System>); 6] = [
     ("smaller phi: symmetric", PresetName::Symmetric, Some(System::Arterial)),
     ("larger phi: lateral branches", PresetName::Lateral, Some(System::Arterial)),
 ];
-/// What radii are multiplied by in the pictures.
-const STOUTNESS: f32 = 2.5;
 /// Where the liver is, beside the discs.
 const LIVER: Vec3 = Vec3::new(3.2, 0.0, 0.0);
 
@@ -78,7 +75,7 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         commands.spawn((
             Name::new(preset.name()),
             assets.organ(disc, Color::srgb(0.93, 0.87, 0.82), place),
-            stouter(Vasculature::new(preset).with_seed(args.seed), 1.7),
+            stouter(Vasculature::new(preset).with_seed(args.seed), 2.5),
             VesselAppearance {
                 show_arterial: shows(System::Arterial),
                 show_venous: shows(System::Venous),
@@ -93,21 +90,13 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     shots.0.push(Shot { file: "discs.png", view, field_of_view: 46.0, endoscope: false });
 }
 
-/// Thicker vessels, for a picture of this size: Murray's law keeps their ratios.
-fn stout(mut wish: Vasculature) -> Vasculature {
-    for system in System::ALL {
-        wish.settings.system_mut(system).terminal_radius *= STOUTNESS;
-    }
-    wish
-}
-
 fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) -> Result {
     let liver = LiverSettings { seed: args.seed, ..default() }.generate()?;
     let place = to_unit_size(liver.mesh.bounds());
     let place = place.with_translation(place.translation + LIVER);
     let roots = [&liver.roots.arterial, &liver.roots.venous].map(|sites| RootPlacement::Nearest(sites.clone()));
     let [arterial, venous] = roots;
-    let mut wish = stouter(Vasculature::new(PresetName::Liver).with_seed(args.seed), 1.6);
+    let mut wish = stouter(Vasculature::new(PresetName::Liver).with_seed(args.seed), 2.0);
     // Coarser than the preset, so that one can look through.
     wish.settings = wish.settings.scaled(1.5);
     commands.spawn((
