@@ -19,16 +19,15 @@ mod common;
 mod endoscopy;
 #[path = "common/organ_file.rs"]
 mod organ_file;
+#[path = "common/wish.rs"]
+mod wish;
 
 use bevy::prelude::*;
 use bevy_vessels::{
     prelude::*,
-    synthesis::{
-        organ::{ColonSettings, OrganMesh, RootSites},
-        tree::System,
-    },
+    synthesis::organ::{ColonSettings, OrganMesh},
 };
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use common::{
     controls::{ControlsPlugin, HELP, Organ, OrganAssets, tell},
     photo::{Shot, Shots},
@@ -37,6 +36,7 @@ use common::{
 use endoscopy::{Lumen, look_inside};
 use organ_file::{OrganFile, OrganFilePlugin, OrganLoaded};
 use std::path::PathBuf;
+use wish::{Mode, WishArgs};
 
 const MORE_HELP: &str = "N  next seed\nI  inside, up and down travel";
 
@@ -48,22 +48,8 @@ struct Args {
     /// Grow on the organ in this glTF file instead of a procedural colon.
     #[arg(long)]
     mesh: Option<PathBuf>,
-    /// Which colon, and which of the networks that the preset can give.
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
-    /// Name of a preset.
-    #[arg(long, default_value = "colon")]
-    preset: PresetName,
-    /// Where vessels grow.
-    #[arg(long, value_enum, default_value_t = Mode::Surface)]
-    mode: Mode,
-}
-
-#[derive(ValueEnum, Clone, Copy, PartialEq)]
-enum Mode {
-    Surface,
-    Volume,
-    Staged,
+    #[command(flatten)]
+    wish: WishArgs,
 }
 
 fn main() -> AppExit {
@@ -95,45 +81,25 @@ fn next_seed(
 ) {
     if keys.just_pressed(KeyCode::KeyN) {
         organs.iter().for_each(|organ| commands.entity(organ).despawn());
-        args.seed += 1;
+        args.wish.seed += 1;
         commands.run_system_cached(spawn_organ);
-    }
-}
-
-impl Args {
-    /// The vessels that are asked for, with their radii multiplied.
-    fn vessels(&self, roots: Option<&RootSites>, radii: f32) -> Vasculature {
-        let mut wish = Vasculature::new(self.preset).with_seed(self.seed);
-        wish.tissue.mode = match self.mode {
-            Mode::Surface => TissueMode::Surface,
-            Mode::Volume => TissueMode::Volume,
-            Mode::Staged => TissueMode::Staged { surface_steps: wish.settings.steps / 2 },
-        };
-        System::ALL.into_iter().for_each(|system| wish.settings.system_mut(system).terminal_radius *= radii);
-        let Some(roots) = roots else { return wish };
-        wish.with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()))
-    }
-
-    /// The tint of the organ: glass, where vessels grow inside.
-    fn tint(&self, color: Color) -> Color {
-        if self.mode == Mode::Surface { color } else { color.with_alpha(0.16) }
     }
 }
 
 /// The colon of the seed. Its outer and its inner side are organs of their own, joined by a rim.
 fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) -> Result {
-    let colon = ColonSettings { seed: args.seed, triangles: 120_000, ..default() }.generate()?;
+    let colon = ColonSettings { seed: args.wish.seed, triangles: 120_000, ..default() }.generate()?;
     let place = to_unit_size(colon.mesh.bounds());
     let mut spawn = |name: &'static str, mesh: OrganMesh, vessels: Option<Vasculature>| {
-        let mut organ = assets.spawn(&mut commands, mesh.into(), args.tint(Color::WHITE), place);
+        let mut organ = assets.spawn(&mut commands, mesh.into(), args.wish.tint(Color::WHITE), place);
         organ.insert(Name::new(name));
         vessels.map(|vessels| organ.insert(vessels));
     };
-    let outside = args.vessels(Some(&colon.roots), 1.4);
-    if args.mode == Mode::Surface {
+    let outside = args.wish.vessels(Some(&colon.roots), 1.4);
+    if args.wish.mode == Mode::Surface {
         spawn("colon", colon.mesh.part(colon.outer.clone()), Some(outside));
         spawn("rim", colon.mesh.part(colon.outer.end..colon.inner.start), None);
-        let inside = args.vessels(Some(&colon.inner_roots), 0.4);
+        let inside = args.wish.vessels(Some(&colon.inner_roots), 0.4);
         spawn("mucosa", colon.mesh.part(colon.inner.clone()), Some(inside));
     } else {
         spawn("colon", colon.mesh.clone(), Some(outside));
@@ -142,7 +108,7 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let line = colon.centre_line.iter().map(|&point| place.transform_point(point)).collect();
     commands.insert_resource(Lumen::new(line, lumen.eye));
     shots.0 = vec![
-        Shot { file: "colon.png", view: moved(&colon.front, &place), field_of_view: 37.0, endoscope: false },
+        Shot { file: "colon.png", view: moved(&colon.front, &place), field_of_view: 40.0, endoscope: false },
         Shot { file: "colon_inside.png", view: lumen, field_of_view: 78.0, endoscope: true },
     ];
     Ok(())
@@ -156,9 +122,9 @@ fn spawn_loaded(
     mut assets: OrganAssets,
     mut shots: ResMut<Shots>,
 ) {
-    let tint = args.tint(Color::srgb(0.74, 0.42, 0.37));
+    let tint = args.wish.tint(Color::srgb(0.74, 0.42, 0.37));
     assets
         .spawn(&mut commands, loaded.mesh.clone(), tint, loaded.place)
-        .insert((Name::new("organ"), args.vessels(None, 1.4)));
-    shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 37.0, endoscope: false }];
+        .insert((Name::new("organ"), args.wish.vessels(None, 1.4)));
+    shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 40.0, endoscope: false }];
 }

@@ -74,14 +74,14 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         let shows = |system| only.is_none_or(|only| only == system);
         assets.spawn(&mut commands, disc, Color::srgb(0.93, 0.87, 0.82), place).insert((
             Name::new(preset.name()),
-            stouter(Vasculature::new(preset).with_seed(args.seed), 1.7),
+            stouter(Vasculature::new(preset).with_seed(args.seed), 2.5),
             VesselAppearance {
                 show_arterial: shows(System::Arterial),
                 show_venous: shows(System::Venous),
                 ..default()
             },
         ));
-        let text = (Text::new(caption), TextFont { font_size: FontSize::Px(18.0), ..default() });
+        let text = (Text::new(caption), TextFont { font_size: FontSize::Px(15.0), ..default() });
         let node = Node { position_type: PositionType::Absolute, ..default() };
         commands.spawn((text, node, Caption(place.translation - 0.53 * Vec3::Y)));
     }
@@ -95,7 +95,7 @@ fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let place = place.with_translation(place.translation + LIVER);
     let roots = [&liver.roots.arterial, &liver.roots.venous].map(|sites| RootPlacement::Nearest(sites.clone()));
     let [arterial, venous] = roots;
-    let mut wish = stouter(Vasculature::new(PresetName::Liver).with_seed(args.seed), 1.6);
+    let mut wish = stouter(Vasculature::new(PresetName::Liver).with_seed(args.seed), 2.0);
     // Coarser than the preset, so that one can look through.
     wish.settings = wish.settings.scaled(1.5);
     let glass = Color::srgba(1.0, 0.9, 0.85, 0.16);

@@ -1,0 +1,55 @@
+//! Which vessels the command line asks for.
+
+use bevy::prelude::*;
+use bevy_vessels::{
+    prelude::*,
+    synthesis::{organ::RootSites, tree::System},
+};
+use clap::{Args, ValueEnum};
+
+/// Preset, seed and tissue.
+#[derive(Args, Clone, Debug)]
+pub struct WishArgs {
+    /// Which organ, where it is procedural, and which of the networks that the preset can give.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Name of a preset.
+    #[arg(long, default_value = "colon")]
+    pub preset: PresetName,
+    /// Where vessels grow.
+    #[arg(long, value_enum, default_value_t = Mode::Surface)]
+    pub mode: Mode,
+}
+
+/// Where vessels grow.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq)]
+pub enum Mode {
+    /// Over the surface.
+    Surface,
+    /// Through the inside.
+    Volume,
+    /// Over the surface for half of the steps, then through the inside.
+    Staged,
+}
+
+impl WishArgs {
+    /// The vessels, with their radii multiplied so that they show from afar, or are fine from near.
+    pub fn vessels(&self, roots: Option<&RootSites>, radii: f32) -> Vasculature {
+        let mut wish = Vasculature::new(self.preset).with_seed(self.seed);
+        wish.tissue.mode = match self.mode {
+            Mode::Surface => TissueMode::Surface,
+            Mode::Volume => TissueMode::Volume,
+            Mode::Staged => TissueMode::Staged { surface_steps: wish.settings.steps / 2 },
+        };
+        for system in System::ALL {
+            wish.settings.system_mut(system).terminal_radius *= radii;
+        }
+        let Some(roots) = roots else { return wish };
+        wish.with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()))
+    }
+
+    /// The tint of the organ: glass, where vessels grow inside.
+    pub fn tint(&self, color: Color) -> Color {
+        if self.mode == Mode::Surface { color } else { color.with_alpha(0.16) }
+    }
+}
