@@ -108,7 +108,7 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let line = colon.centre_line.iter().map(|&point| place.transform_point(point)).collect();
     commands.insert_resource(Lumen::new(line, lumen.eye));
     shots.0 = vec![
-        Shot { file: "colon.png", view: moved(&colon.front, &place), field_of_view: 40.0, endoscope: false },
+        Shot { file: "colon.png", view: moved(&colon.front, &place), field_of_view: 42.0, endoscope: false },
         Shot { file: "colon_inside.png", view: lumen, field_of_view: 78.0, endoscope: true },
     ];
     Ok(())
@@ -126,5 +126,5 @@ fn spawn_loaded(
     assets
         .spawn(&mut commands, loaded.mesh.clone(), tint, loaded.place)
         .insert((Name::new("organ"), args.wish.vessels(None, 1.4)));
-    shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 40.0, endoscope: false }];
+    shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 42.0, endoscope: false }];
 }
