@@ -103,11 +103,12 @@ impl Growth {
         seed: u64,
     ) -> Result<Self, GrowthError> {
         settings.validate()?;
+        let placed = Self::placed(tissue.as_ref(), &settings, roots, seed)?;
         let bounds = tissue.bounds();
         let systems = System::ALL.map(|system| SystemGrowth::new(settings.system(system), &bounds));
         let rng = Stream::Attraction.rng(seed);
         let mut growth = Self { tissue, settings, systems, rng, step: 0, candidates: Vec::new(), supplied: Vec::new() };
-        growth.plant(roots, seed)?;
+        growth.plant(&placed, roots);
         Ok(growth)
     }
 
@@ -125,13 +126,7 @@ impl Growth {
         self.settings = settings;
         self.rng = Stream::Attraction.rng(seed);
         self.step = 0;
-        self.plant_at(&placed, roots);
-        Ok(())
-    }
-
-    fn plant(&mut self, roots: &Roots, seed: u64) -> Result<(), GrowthError> {
-        let placed = Self::placed(self.tissue.as_ref(), &self.settings, roots, seed)?;
-        self.plant_at(&placed, roots);
+        self.plant(&placed, roots);
         Ok(())
     }
 
@@ -147,9 +142,9 @@ impl Growth {
         if placed[arteries].is_empty() && !given { Err(GrowthError::NoArterialRoot) } else { Ok(placed) }
     }
 
-    fn plant_at(&mut self, placed: &[Vec<TissuePoint>; 2], roots: &Roots) {
+    fn plant(&mut self, placed: &[Vec<TissuePoint>; 2], roots: &Roots) {
+        let ground = ground(self.tissue.as_ref(), &self.settings, 1);
         for (index, system) in self.systems.iter_mut().enumerate() {
-            let ground = ground(self.tissue.as_ref(), &self.settings, 1);
             system.plant(&placed[index], roots.given[index].as_ref(), ground);
         }
     }
