@@ -6,11 +6,13 @@
 use bevy_math::Vec3;
 
 mod hash;
+mod place;
 pub mod statistics;
 pub mod sweep;
 pub mod validate;
 
 pub use hash::hash_trees;
+pub use place::Place;
 pub use statistics::TreeStatistics;
 pub use validate::TreeError;
 
