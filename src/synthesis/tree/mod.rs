@@ -18,6 +18,7 @@ pub use validate::TreeError;
 
 /// A node of a [`VesselTree`], and the segment that ends in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct NodeId(pub u32);
 
 impl NodeId {
