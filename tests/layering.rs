@@ -294,8 +294,11 @@ fn known_module(name: &str, code: &str) -> bool {
 }
 
 fn is_primitive(word: &str) -> bool {
-    ["f32", "f64", "bool", "char", "str", "u8", "u16", "u32", "u64", "usize", "i8", "i16", "i32", "i64", "isize"]
-        .contains(&word)
+    [
+        "f32", "f64", "bool", "char", "str", "u8", "u16", "u32", "u64", "u128", "usize", "i8", "i16", "i32", "i64",
+        "isize",
+    ]
+    .contains(&word)
 }
 
 /// `Reflect` may be derived on settings behind the feature that brings Bevy: the one engine path of the pure half.

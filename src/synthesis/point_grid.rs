@@ -1,14 +1,15 @@
 //! An index over points that come, go and are asked for while vessels grow.
 //!
-//! A uniform grid in two levels: a table of bricks of 4×4×4 cells, of which only those with points exist, so a probe of
-//! empty space costs one load and a surface in a large box costs little memory. A cell is a chain through `next`, so
-//! adding a point allocates nothing once the arrays have room.
+//! A uniform grid in two levels: a table of bricks of 4×4×4 cells, of which only those with points exist, so a surface in a
+//! large box costs little memory. Each brick knows its filled cells as the bits of one word: a question looks at those of
+//! them that its box meets, and empty space costs next to nothing. A cell is a chain through `next`, so adding a point
+//! allocates nothing once the arrays have room.
 //!
 //! Why not kiddo here: its mutable tree refuses more than 32 points that share a coordinate, as all of a disc at z = 0
 //! do, and points cannot be removed from its immutable one. It serves where a point set is static (coverage of a
 //! finished tree).
 
-use bevy_math::{UVec3, Vec3, bounding::Aabb3d};
+use bevy_math::{UVec3, Vec3, Vec3A, bounding::Aabb3d};
 
 /// Cells along each side of a brick.
 const SIDE: u32 = 4;
@@ -24,18 +25,35 @@ const NONE: u32 = u32::MAX;
 /// Points outside the box are kept in its outermost cells: correct, if slower.
 #[derive(Clone, Debug, Default)]
 pub struct PointGrid {
-    origin: Vec3,
+    origin: Vec3A,
     cell: f32,
     inverse_cell: f32,
     /// Number of cells along each axis.
     cells: UVec3,
+    /// Index of the last cell along each axis, as a number that coordinates are compared with.
+    last: Vec3A,
+    /// How much wider than asked for, in cells, a box is taken so that rounding leaves out no cell.
+    margin: f32,
     /// Number of bricks along x, and in an xy layer.
     row: u32,
     layer: u32,
-    bricks: Vec<u32>,
-    heads: Vec<[u32; CELLS]>,
-    points: Vec<Vec3>,
-    next: Vec<u32>,
+    table: Vec<u32>,
+    bricks: Vec<Brick>,
+    entries: Vec<Entry>,
+}
+
+/// 4×4×4 cells: which of them hold points, and the first point of each of these.
+#[derive(Clone, Debug)]
+struct Brick {
+    filled: u64,
+    heads: [u32; CELLS],
+}
+
+/// A point and the next one in its cell: together, so that a step along a chain is one load.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    point: Vec3,
+    next: u32,
 }
 
 impl PointGrid {
@@ -50,24 +68,23 @@ impl PointGrid {
 
     /// Removes all points and lays the grid anew, keeping its memory.
     pub fn reset(&mut self, bounds: &Aabb3d, cell: f32) {
-        self.points.clear();
-        self.next.clear();
-        self.lay(Vec3::from(bounds.min), Vec3::from(bounds.max), cell);
+        self.entries.clear();
+        self.lay(bounds.min, bounds.max, cell);
     }
 
     /// Lays the grid anew with cells of another size; the points stay.
     pub fn resize_cells(&mut self, cell: f32) {
-        let max = self.origin + self.cells.as_vec3() * self.cell;
+        let max = self.origin + self.cells.as_vec3a() * self.cell;
         self.lay(self.origin, max, cell);
-        for id in 0..self.points.len() {
-            if self.next[id] != REMOVED {
+        for id in 0..self.entries.len() {
+            if self.entries[id].next != REMOVED {
                 self.link(id as u32);
             }
         }
     }
 
-    fn lay(&mut self, min: Vec3, max: Vec3, cell: f32) {
-        let size = (max - min).max(Vec3::ZERO);
+    fn lay(&mut self, min: Vec3A, max: Vec3A, cell: f32) {
+        let size = (max - min).max(Vec3A::ZERO);
         let bricks = |cell: f32| {
             let along = |length: f32| (f64::from(length) / f64::from(cell) / f64::from(SIDE)).floor() + 1.0;
             along(size.x) * along(size.y) * along(size.z)
@@ -82,12 +99,14 @@ impl PointGrid {
         self.cell = cell;
         self.inverse_cell = cell.recip();
         self.cells = (size * self.inverse_cell).as_uvec3() + UVec3::ONE;
+        self.last = (self.cells - UVec3::ONE).as_vec3a();
+        self.margin = 1e-3 + self.last.max_element() * 1e-6;
         let sides = (self.cells + (SIDE - 1)) / SIDE;
         self.row = sides.x;
         self.layer = sides.x * sides.y;
+        self.table.clear();
+        self.table.resize((self.layer * sides.z) as usize, NONE);
         self.bricks.clear();
-        self.bricks.resize((self.layer * sides.z) as usize, NONE);
-        self.heads.clear();
     }
 
     /// Side of a cell.
@@ -97,69 +116,98 @@ impl PointGrid {
 
     /// Number of ids given out, removed points included.
     pub fn len(&self) -> usize {
-        self.points.len()
+        self.entries.len()
     }
 
     /// Whether no id has been given out.
     pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
+        self.entries.is_empty()
     }
 
     /// The point of an id.
     pub fn point(&self, id: u32) -> Vec3 {
-        self.points[id as usize]
+        self.entries[id as usize].point
     }
 
     /// Adds a point; its id is the number of ids before it.
     pub fn push(&mut self, point: Vec3) -> u32 {
-        let id = self.points.len() as u32;
-        self.points.push(point);
-        self.next.push(NONE);
+        let id = self.entries.len() as u32;
+        self.entries.push(Entry { point, next: NONE });
         self.link(id);
         id
     }
 
     /// Puts a new point at the id of a removed one.
     pub fn replace(&mut self, id: u32, point: Vec3) {
-        debug_assert_eq!(self.next[id as usize], REMOVED);
-        self.points[id as usize] = point;
+        debug_assert_eq!(self.entries[id as usize].next, REMOVED);
+        self.entries[id as usize].point = point;
         self.link(id);
     }
 
     /// Removes a point. Its id may be used again by [`replace`](Self::replace).
     pub fn remove(&mut self, id: u32) {
-        let (brick, cell) = self.locate(self.cell_of(self.points[id as usize]));
-        let after = self.next[id as usize];
-        let head = &mut self.heads[self.bricks[brick] as usize][cell];
+        let Entry { point, next: after } = self.entries[id as usize];
+        let (place, cell) = self.locate(self.cell_of(point));
+        let brick = &mut self.bricks[self.table[place] as usize];
+        let head = &mut brick.heads[cell];
         if *head == id {
             *head = after;
+            if after == NONE {
+                brick.filled &= !(1 << cell);
+            }
         } else {
             let mut before = *head;
-            while self.next[before as usize] != id {
-                before = self.next[before as usize];
+            while self.entries[before as usize].next != id {
+                before = self.entries[before as usize].next;
             }
-            self.next[before as usize] = after;
+            self.entries[before as usize].next = after;
         }
-        self.next[id as usize] = REMOVED;
+        self.entries[id as usize].next = REMOVED;
     }
 
     fn link(&mut self, id: u32) {
-        let (brick, cell) = self.locate(self.cell_of(self.points[id as usize]));
-        if self.bricks[brick] == NONE {
-            self.bricks[brick] = self.heads.len() as u32;
-            self.heads.push([NONE; CELLS]);
+        let (place, cell) = self.locate(self.cell_of(self.entries[id as usize].point));
+        let brick = &mut self.table[place];
+        if *brick == NONE {
+            *brick = self.bricks.len() as u32;
+            self.bricks.push(Brick { filled: 0, heads: [NONE; CELLS] });
         }
-        let head = &mut self.heads[self.bricks[brick] as usize][cell];
-        self.next[id as usize] = *head;
-        *head = id;
+        let brick = &mut self.bricks[*brick as usize];
+        brick.filled |= 1 << cell;
+        self.entries[id as usize].next = std::mem::replace(&mut brick.heads[cell], id);
     }
 
-    /// Cell of a point, clamped to the box. The cast saturates, so points at infinity are as safe as NaN, which is cell 0.
+    /// Where a point lies, in cells.
+    #[inline]
+    fn local(&self, point: Vec3) -> Vec3A {
+        (Vec3A::from(point) - self.origin) * self.inverse_cell
+    }
+
+    /// The cell at a place, clamped to the box; no number is cell 0.
+    ///
+    /// Where a fraction begins is of no matter, as long as greater places never have lower cells. So the place is rounded,
+    /// for all three axes at once: added to 2²³ it is an integer that stands in the lowest bits.
+    #[inline]
+    fn cell_at(&self, local: Vec3A) -> UVec3 {
+        let clamped = (local - 0.5).max(Vec3A::ZERO).min(self.last);
+        UVec3::from_array((clamped + INTEGERS).to_array().map(f32::to_bits)) - UVec3::splat(INTEGERS.to_bits())
+    }
+
+    /// The cell of a point.
+    #[inline]
     fn cell_of(&self, point: Vec3) -> UVec3 {
-        ((point - self.origin) * self.inverse_cell).as_uvec3().min(self.cells - UVec3::ONE)
+        self.cell_at(self.local(point))
+    }
+
+    /// Lowest and highest cell of the box around a ball.
+    #[inline]
+    fn cells_around(&self, local: Vec3A, radius: f32) -> (UVec3, UVec3) {
+        let reach = radius * self.inverse_cell + self.margin;
+        (self.cell_at(local - reach), self.cell_at(local + reach))
     }
 
     /// Index of a cell's brick in the table, and of the cell in the brick.
+    #[inline]
     fn locate(&self, cell: UVec3) -> (usize, usize) {
         let brick = cell / SIDE;
         let inner = cell % SIDE;
@@ -170,85 +218,177 @@ impl PointGrid {
     }
 
     /// First point of a cell's chain.
+    #[inline]
     fn head(&self, cell: UVec3) -> u32 {
-        let (brick, inner) = self.locate(cell);
-        match self.bricks[brick] {
+        let (place, inner) = self.locate(cell);
+        match self.table[place] {
             NONE => NONE,
-            brick => self.heads[brick as usize][inner],
+            brick => self.bricks[brick as usize].heads[inner],
         }
     }
 
-    /// Calls `visit(id, squared distance)` for points within `radius`, until it answers false. In no particular order.
-    fn scan(&self, center: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> bool) {
-        if self.points.is_empty() {
-            return;
-        }
-        let low = self.cell_of(center - radius);
-        let high = self.cell_of(center + radius);
-        let limit = radius * radius;
-        for z in low.z..=high.z {
-            for y in low.y..=high.y {
-                for x in low.x..=high.x {
-                    let mut id = self.head(UVec3::new(x, y, z));
-                    while id != NONE {
-                        let distance = self.points[id as usize].distance_squared(center);
-                        if distance <= limit && !visit(id, distance) {
+    /// Calls `visit(first point)` for the filled cells of a box of cells, until it answers false.
+    #[inline]
+    fn for_cells(&self, low: UVec3, high: UVec3, mut visit: impl FnMut(u32) -> bool) {
+        let (first, last) = (low / SIDE, high / SIDE);
+        for z in first.z..=last.z {
+            let layers = LAYERS[range(low.z, high.z, z)];
+            for y in first.y..=last.y {
+                let rows = layers & ROWS[range(low.y, high.y, y)];
+                let place = (y * self.row + z * self.layer) as usize;
+                for x in first.x..=last.x {
+                    let brick = self.table[place + x as usize];
+                    if brick == NONE {
+                        continue;
+                    }
+                    let brick = &self.bricks[brick as usize];
+                    let mut cells = brick.filled & rows & COLUMNS[range(low.x, high.x, x)];
+                    while cells != 0 {
+                        if !visit(brick.heads[cells.trailing_zeros() as usize]) {
                             return;
                         }
-                        id = self.next[id as usize];
+                        cells &= cells - 1;
                     }
                 }
             }
         }
     }
 
+    /// Visits the points within a radius that may shrink on the way: `visit(id, squared distance)` answers with the squared
+    /// radius from there on. The centre's own cell comes first, the others in no particular order.
+    #[inline]
+    fn scan(&self, center: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> f32) {
+        if self.entries.is_empty() {
+            return;
+        }
+        let mut limit = radius * radius;
+        let local = self.local(center);
+        let own = self.head(self.cell_at(local));
+        self.scan_chain(own, center, &mut limit, &mut visit);
+        let (low, high) = self.cells_around(local, radius.min(limit.sqrt()));
+        self.for_cells(low, high, |head| {
+            if head != own {
+                self.scan_chain(head, center, &mut limit, &mut visit);
+            }
+            true
+        });
+    }
+
+    #[inline]
+    fn scan_chain(&self, head: u32, center: Vec3, limit: &mut f32, visit: &mut impl FnMut(u32, f32) -> f32) {
+        let mut id = head;
+        while id != NONE {
+            let entry = &self.entries[id as usize];
+            let distance = entry.point.distance_squared(center);
+            if distance <= *limit {
+                *limit = visit(id, distance);
+            }
+            id = entry.next;
+        }
+    }
+
     /// Whether a point lies within `radius` of `center`, the radius included.
     pub fn any_within(&self, center: Vec3, radius: f32) -> bool {
-        if self.points.is_empty() {
-            return false;
-        }
-        // The centre's own cell answers for most of a filled tissue.
         let limit = radius * radius;
-        let mut id = self.head(self.cell_of(center));
-        while id != NONE {
-            if self.points[id as usize].distance_squared(center) <= limit {
-                return true;
-            }
-            id = self.next[id as usize];
+        let local = self.local(center);
+        // The centre's own cell answers for most of a filled tissue.
+        if self.chain_reaches(self.head(self.cell_at(local)), center, limit) {
+            return true;
         }
+        let (low, high) = self.cells_around(local, radius);
         let mut found = false;
-        self.scan(center, radius, |_, _| {
-            found = true;
-            false
+        self.for_cells(low, high, |head| {
+            found = self.chain_reaches(head, center, limit);
+            !found
         });
         found
     }
 
+    #[inline]
+    fn chain_reaches(&self, head: u32, center: Vec3, limit: f32) -> bool {
+        let mut id = head;
+        while id != NONE {
+            let entry = &self.entries[id as usize];
+            if entry.point.distance_squared(center) <= limit {
+                return true;
+            }
+            id = entry.next;
+        }
+        false
+    }
+
     /// Calls `visit(id, squared distance)` for every point within `radius`, in no particular order.
     pub fn for_each_within(&self, center: Vec3, radius: f32, mut visit: impl FnMut(u32, f32)) {
+        let limit = radius * radius;
         self.scan(center, radius, |id, distance| {
             visit(id, distance);
-            true
+            limit
         });
     }
 
     /// The nearest point within `radius` that `accepts` its id, with its squared distance. Of several at one distance
     /// the lowest id wins, whatever the order in which they were added.
     pub fn nearest_within(&self, center: Vec3, radius: f32, accepts: impl Fn(u32) -> bool) -> Option<(u32, f32)> {
-        let mut best: Option<(u32, f32)> = None;
-        self.scan(center, radius, |id, distance| {
+        self.nearest_two(center, radius, radius, accepts).0
+    }
+
+    /// As [`nearest_within`](Self::nearest_within), and the squared distance of the nearest point of all within `reach`,
+    /// infinite where there is none. `reach` is not below `radius`.
+    pub fn nearest_two(
+        &self,
+        center: Vec3,
+        reach: f32,
+        radius: f32,
+        accepts: impl Fn(u32) -> bool,
+    ) -> (Option<(u32, f32)>, f32) {
+        let (mut best, mut closest): (Option<(u32, f32)>, _) = (None, f32::INFINITY);
+        let (mut limit, within) = (reach * reach, radius * radius);
+        self.scan(center, reach, |id, distance| {
+            closest = closest.min(distance);
             let closer = best.is_none_or(|(other, least)| distance < least || (distance == least && id < other));
-            if closer && accepts(id) {
+            if distance <= within && closer && accepts(id) {
                 best = Some((id, distance));
+                limit = distance;
             }
-            true
+            limit
         });
-        best
+        (best, closest)
     }
 }
 
+/// From here on to its double every number is an integer.
+const INTEGERS: f32 = (1 << 23) as f32;
 /// What `next` holds for a removed point.
 const REMOVED: u32 = u32::MAX - 1;
+
+/// The cells of a brick that lie in a range along x, y or z, by the range's [number](range).
+const COLUMNS: [u64; 16] = cells_in_ranges(1);
+const ROWS: [u64; 16] = cells_in_ranges(SIDE);
+const LAYERS: [u64; 16] = cells_in_ranges(SIDE * SIDE);
+
+const fn cells_in_ranges(stride: u32) -> [u64; 16] {
+    let mut masks = [0; 16];
+    let mut cell = 0;
+    while cell < CELLS as u32 {
+        let along = cell / stride % SIDE;
+        let mut range = 0;
+        while range < 16 {
+            if range / SIDE <= along && along <= range % SIDE {
+                masks[range as usize] |= 1 << cell;
+            }
+            range += 1;
+        }
+        cell += 1;
+    }
+    masks
+}
+
+/// Number of the part of a range of cells, `low` to `high` along an axis, that lies in a brick.
+#[inline]
+fn range(low: u32, high: u32, brick: u32) -> usize {
+    let first = brick * SIDE;
+    ((low.max(first) - first) * SIDE + high.min(first + SIDE - 1) - first) as usize
+}
 
 #[cfg(test)]
 mod tests {

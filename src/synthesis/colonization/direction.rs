@@ -17,8 +17,14 @@ pub(crate) enum Decision {
     Rest,
 }
 
-/// Decides for a node that hears the given drains.
-pub(crate) fn decide(forest: &Forest, lengths: &Lengths, node: u32, drains: &[Vec3]) -> Decision {
+/// Decides for a node that hears the given drains. `angles` is scratch.
+pub(crate) fn decide(
+    forest: &Forest,
+    lengths: &Lengths,
+    node: u32,
+    drains: &[Vec3],
+    angles: &mut Vec<f32>,
+) -> Decision {
     let index = node as usize;
     let position = forest.tree.positions()[index];
     let pull: Vec3 = drains.iter().map(|drain| (drain - position).normalize_or_zero()).sum();
@@ -29,13 +35,15 @@ pub(crate) fn decide(forest: &Forest, lengths: &Lengths, node: u32, drains: &[Ve
     let along = forest.directions[index];
     if forest.children(node) > 0 {
         return mean.map_or(Decision::Rest, |mean| {
-            let angle = forest.sprout_angle(node, lengths.terminal_radius);
+            let angle = forest.sprout_angle(node);
             let beside = turn_toward(along, mean, angle);
             Decision::Extend(mix(beside, mean, lengths.direction_weight))
         });
     }
     let growth = mean.map_or(along, |mean| mix(along, mean, lengths.direction_weight));
-    if drains.len() >= 2 && spread(position, along, drains, lengths.angle_spread) >= lengths.bifurcation_threshold {
+    if drains.len() >= 2
+        && spread(position, along, drains, lengths.angle_spread, angles) >= lengths.bifurcation_threshold
+    {
         return Decision::Bifurcate(bifurcate(position, growth, drains, lengths.half_bifurcation));
     }
     Decision::Extend(growth)
@@ -57,12 +65,14 @@ fn rotate(vector: Vec3, axis: Vec3, angle: f32) -> Vec3 {
     Quat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos) * vector
 }
 
-/// Spread, in radians, of the angles between a direction and the directions to the drains.
-fn spread(position: Vec3, along: Vec3, drains: &[Vec3], measure: AngleSpread) -> f32 {
+/// Spread, in radians, of the angles between a direction and the directions to the drains. `angles` is scratch.
+fn spread(position: Vec3, along: Vec3, drains: &[Vec3], measure: AngleSpread, angles: &mut Vec<f32>) -> f32 {
     let angle = |drain: &Vec3| ops::acos(along.dot((drain - position).normalize_or(along)).clamp(-1.0, 1.0));
+    angles.clear();
+    angles.extend(drains.iter().map(angle));
     let count = drains.len() as f32;
-    let mean = drains.iter().map(angle).sum::<f32>() / count;
-    let squares: f32 = drains.iter().map(|drain| angle(drain) - mean).map(|off| off * off).sum();
+    let mean = angles.iter().sum::<f32>() / count;
+    let squares: f32 = angles.iter().map(|angle| angle - mean).map(|off| off * off).sum();
     match measure {
         AngleSpread::StandardDeviation => (squares / count).sqrt(),
         AngleSpread::RootSumOfSquares => squares.sqrt(),
@@ -142,8 +152,8 @@ mod tests {
     #[test]
     fn spread_is_measured_as_asked() {
         let drains = [Vec3::new(1.0, 1.0, 0.0), Vec3::X];
-        let deviation = spread(Vec3::ZERO, Vec3::X, &drains, AngleSpread::StandardDeviation);
-        let root = spread(Vec3::ZERO, Vec3::X, &drains, AngleSpread::RootSumOfSquares);
+        let deviation = spread(Vec3::ZERO, Vec3::X, &drains, AngleSpread::StandardDeviation, &mut Vec::new());
+        let root = spread(Vec3::ZERO, Vec3::X, &drains, AngleSpread::RootSumOfSquares, &mut Vec::new());
         assert!((deviation.to_degrees() - 22.5).abs() < 1e-3);
         assert!((root.to_degrees() - 22.5 * 2.0_f32.sqrt()).abs() < 1e-3);
     }

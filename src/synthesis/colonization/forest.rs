@@ -7,6 +7,10 @@ use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d, ops};
 
 /// A growing forest. All vectors have one entry per node.
+///
+/// Of a node's radius growth itself needs the *sum*, r^κ in units of the full terminal radius: a tip's own, elsewhere that
+/// of its children. Sums are right after every step; the radii in the tree only after [`settle`](Self::settle), since a
+/// power for every changed node and step would be most of the work.
 #[derive(Debug, Default)]
 pub(crate) struct Forest {
     pub tree: VesselTree,
@@ -16,16 +20,38 @@ pub(crate) struct Forest {
     pub normals: Vec<Vec3>,
     /// Step in which the node was born, 0 for what was there at the start.
     pub birth_steps: Vec<u32>,
-    children: Vec<u32>,
-    /// r^κ in units of the full terminal radius: a tip's own, elsewhere the sum of the children's.
-    sums: Vec<f32>,
-    /// Scratch of the sweep, zero between sweeps.
-    pending: Vec<f32>,
+    kin: Vec<Kin>,
+    fanouts: Vec<Fanout>,
     index: PointGrid,
-    /// Nodes whose radius the last sweep changed.
+    /// Nodes whose sum must be added up again.
+    unsummed: NodeSet,
+    /// Nodes whose sum changed since the radii were last settled.
+    unsettled: NodeSet,
+    /// Nodes whose radius the last settling changed.
     changed: Vec<u32>,
+    /// Radius of a new tip, and its sum.
+    tip: (f32, f32),
     terminal_radius: f32,
     exponent: f32,
+}
+
+/// A node's sum and its children, as a list that begins with the youngest.
+#[derive(Clone, Copy, Debug)]
+struct Kin {
+    sum: f32,
+    first_child: u32,
+    next_sibling: u32,
+}
+
+/// What stands for no child.
+const NONE: u32 = u32::MAX;
+
+/// Number of a node's children, and whether it is a root.
+#[derive(Clone, Copy, Debug, Default)]
+struct Fanout(u16);
+
+impl Fanout {
+    const ROOT: u16 = 1 << 15;
 }
 
 impl Forest {
@@ -35,13 +61,15 @@ impl Forest {
         self.directions.clear();
         self.normals.clear();
         self.birth_steps.clear();
-        self.children.clear();
-        self.sums.clear();
-        self.pending.clear();
+        self.kin.clear();
+        self.fanouts.clear();
+        self.unsummed.clear();
+        self.unsettled.clear();
         self.changed.clear();
         self.index.reset(bounds, cell);
         self.terminal_radius = terminal_radius;
         self.exponent = exponent;
+        self.tip = (terminal_radius, 1.0);
     }
 
     /// The index over all nodes.
@@ -54,28 +82,51 @@ impl Forest {
         self.index.resize_cells(cell);
     }
 
+    /// Sets the radius of the tips that are born from now on.
+    pub fn set_tip_radius(&mut self, radius: f32) {
+        if radius != self.tip.0 {
+            self.tip = (radius, self.sum_of(radius));
+        }
+    }
+
     /// Adds a root whose vessel would be of the given radius if it were a tip.
     pub fn add_root(&mut self, at: TissuePoint, radius: f32) {
         self.tree.push_root(at.position, radius);
-        self.add_channels(at, Vec3::ZERO, radius, 0);
+        self.add_channels(at, Vec3::ZERO, self.sum_of(radius), 0);
+        self.fanouts.push(Fanout(Fanout::ROOT));
     }
 
-    /// Adds a tip of the given radius to a node. The radii towards the root follow with the next [`sweep`](Self::sweep).
-    pub fn add_child(&mut self, parent: u32, at: TissuePoint, radius: f32, step: u32) -> u32 {
-        let direction = (at.position - self.tree.positions()[parent as usize]).normalize_or_zero();
-        let id = self.tree.push_child(NodeId(parent), at.position, radius);
-        self.children[parent as usize] += 1;
-        self.add_channels(at, direction, radius, step);
-        id.0
+    /// Adds a tip of a given radius to a node that was there at the start.
+    pub fn add_given(&mut self, parent: u32, at: TissuePoint, radius: f32) {
+        self.add_child(parent, at, radius, self.sum_of(radius), 0);
     }
 
-    fn add_channels(&mut self, at: TissuePoint, direction: Vec3, radius: f32, step: u32) {
+    /// Adds a tip to a node. The sums towards the root follow with the next [`sum_up`](Self::sum_up).
+    pub fn add_tip(&mut self, parent: u32, at: TissuePoint, step: u32) {
+        let (radius, sum) = self.tip;
+        self.add_child(parent, at, radius, sum, step);
+    }
+
+    fn add_child(&mut self, parent: u32, at: TissuePoint, radius: f32, sum: f32, step: u32) {
+        let above = parent as usize;
+        let direction = (at.position - self.tree.positions()[above]).normalize_or_zero();
+        let id = self.tree.push_child(NodeId(parent), at.position, radius).0;
+        self.add_channels(at, direction, sum, step);
+        let fanout = &mut self.fanouts[above].0;
+        if *fanout & !Fanout::ROOT < Fanout::ROOT - 1 {
+            *fanout += 1;
+        }
+        self.fanouts.push(Fanout::default());
+        self.kin[id as usize].next_sibling = std::mem::replace(&mut self.kin[above].first_child, id);
+        self.unsummed.insert(parent);
+    }
+
+    fn add_channels(&mut self, at: TissuePoint, direction: Vec3, sum: f32, step: u32) {
         self.directions.push(direction);
         self.normals.push(at.normal);
         self.birth_steps.push(step);
-        self.children.push(0);
-        self.sums.push(self.sum_of(radius));
-        self.pending.push(0.0);
+        self.unsettled.insert(self.kin.len() as u32);
+        self.kin.push(Kin { sum, first_child: NONE, next_sibling: NONE });
         self.index.push(at.position);
     }
 
@@ -84,52 +135,143 @@ impl Forest {
         if radius == self.terminal_radius { 1.0 } else { ops::powf(radius / self.terminal_radius, self.exponent) }
     }
 
-    /// Number of children of a node.
+    /// Number of children of a node; 32,767 where there are more.
     pub fn children(&self, node: u32) -> u32 {
-        self.children[node as usize]
+        u32::from(self.fanouts[node as usize].0 & !Fanout::ROOT)
     }
 
     /// Whether a node is a root.
     pub fn is_root(&self, node: u32) -> bool {
-        self.tree.parents()[node as usize] == NO_PARENT
+        self.fanouts[node as usize].0 & Fanout::ROOT != 0
     }
 
-    /// Angle at which a branch of the given terminal radius leaves an inter-node beside its only child, in radians.
-    pub fn sprout_angle(&self, node: u32, terminal_radius: f32) -> f32 {
+    /// Angle at which a new tip leaves an inter-node beside its only child, in radians.
+    pub fn sprout_angle(&self, node: u32) -> f32 {
         // With one child the sum at the node is the child's.
-        murray::sprout_angle(self.sums[node as usize] / self.sum_of(terminal_radius), self.exponent)
+        murray::sprout_angle(self.kin[node as usize].sum / self.tip.1, self.exponent)
     }
 
-    /// Nodes whose radius the last sweep changed, from the tips to the roots.
+    /// Adds up the sums of all nodes that new tips changed, from the tips to the roots. `changed` is told each of them that
+    /// was there before.
+    ///
+    /// A node's sum is always added up afresh, from its youngest child to its oldest, so that it is the same whatever
+    /// happened on the way. Children stand behind their parents: one descent through the set meets every node after its
+    /// children.
+    pub fn sum_up(&mut self, mut changed: impl FnMut(u32)) {
+        while let Some(node) = self.unsummed.pop_last() {
+            let sum = self.children_of(node).map(|child| self.kin[child as usize].sum).sum();
+            let own = &mut self.kin[node as usize];
+            if sum != own.sum {
+                own.sum = sum;
+                self.unsettled.insert(node);
+                changed(node);
+                let parent = self.tree.parents()[node as usize];
+                if parent != NO_PARENT {
+                    self.unsummed.insert(parent);
+                }
+            }
+        }
+    }
+
+    fn children_of(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        let link = |child: u32| (child != NONE).then_some(child);
+        let next = move |&child: &u32| link(self.kin[child as usize].next_sibling);
+        std::iter::successors(link(self.kin[node as usize].first_child), next)
+    }
+
+    /// Renews by Murray's law the radii of all nodes whose sum changed since the last time, from the tips to the roots.
+    pub fn settle(&mut self) {
+        self.changed.clear();
+        let inverse_exponent = self.exponent.recip();
+        let radii = self.tree.radii_mut();
+        while let Some(node) = self.unsettled.pop_last() {
+            let sum = self.kin[node as usize].sum;
+            let radius = if sum == 1.0 { 1.0 } else { ops::powf(sum, inverse_exponent) };
+            radii[node as usize] = self.terminal_radius * radius;
+            self.changed.push(node);
+        }
+    }
+
+    /// Nodes whose radius the last settling changed, new ones included, from the tips to the roots.
     pub fn changed(&self) -> &[u32] {
         &self.changed
     }
+}
 
-    /// Forgets which radii changed.
-    pub fn clear_changed(&mut self) {
-        self.changed.clear();
+/// A set of nodes that gives them back from the last to the first. Members may be added on the way, below the last one taken.
+#[derive(Debug, Default)]
+struct NodeSet {
+    words: Vec<u64>,
+    /// Number of words up to the last one with members.
+    end: usize,
+}
+
+impl NodeSet {
+    fn clear(&mut self) {
+        self.words.clear();
+        self.end = 0;
     }
 
-    /// Renews all radii by Murray's law, from the tips to the roots.
-    ///
-    /// Sums are added up afresh in one fixed order, so what has not changed comes out bit for bit the same, and is told
-    /// from what has. Nodes from `first_new` on count as changed.
-    pub fn sweep(&mut self, first_new: usize) {
-        self.changed.clear();
-        let inverse_exponent = self.exponent.recip();
-        for node in (0..self.tree.len()).rev() {
-            let gathered = std::mem::take(&mut self.pending[node]);
-            let sum = if self.children[node] == 0 { self.sums[node] } else { gathered };
-            let parent = self.tree.parents()[node];
-            if parent != NO_PARENT {
-                self.pending[parent as usize] += sum;
-            }
-            if sum != self.sums[node] || node >= first_new {
-                self.sums[node] = sum;
-                self.changed.push(node as u32);
-                let radius = if sum == 1.0 { 1.0 } else { ops::powf(sum, inverse_exponent) };
-                self.tree.radii_mut()[node] = self.terminal_radius * radius;
-            }
+    fn insert(&mut self, node: u32) {
+        let word = node as usize / 64;
+        if word >= self.words.len() {
+            self.words.resize(word + 1, 0);
         }
+        self.words[word] |= 1 << (node % 64);
+        self.end = self.end.max(word + 1);
+    }
+
+    fn pop_last(&mut self) -> Option<u32> {
+        while let Some(last) = self.end.checked_sub(1) {
+            let word = &mut self.words[last];
+            if *word != 0 {
+                let bit = 63 - word.leading_zeros();
+                *word &= !(1 << bit);
+                return Some(last as u32 * 64 + bit);
+            }
+            self.end = last;
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f32) -> TissuePoint {
+        TissuePoint { position: Vec3::X * x, normal: Vec3::ZERO }
+    }
+
+    #[test]
+    fn radii_of_a_tree_come_from_its_tips() {
+        let (exponent, mut forest) = (2.55, Forest::default());
+        forest.reset(&Aabb3d::new(Vec3::ZERO, Vec3::ONE), 0.1, 0.01, exponent);
+        forest.add_root(at(0.0), 0.01);
+        for (parent, x) in [(0, 0.1), (1, 0.2), (1, 0.3)] {
+            forest.add_tip(parent, at(x), 0);
+        }
+        let mut summed = Vec::new();
+        forest.sum_up(|node| summed.push(node));
+        forest.settle();
+        let radii = forest.tree.radii();
+        let expected = murray::parent_radius(0.01, 0.01, exponent);
+        assert!((radii[1] - expected).abs() < 1e-7 && (radii[0] - expected).abs() < 1e-7);
+        assert!((radii[2] - 0.01).abs() < 1e-8);
+        assert_eq!((summed, forest.changed()), (vec![1, 0], &[3, 2, 1, 0][..]));
+        forest.settle();
+        assert!(forest.changed().is_empty());
+    }
+
+    #[test]
+    fn a_set_gives_its_members_from_the_last_to_the_first() {
+        let mut set = NodeSet::default();
+        [5, 700, 64, 63, 5].into_iter().for_each(|node| set.insert(node));
+        assert_eq!(set.pop_last(), Some(700));
+        set.insert(699);
+        set.insert(3);
+        let rest: Vec<u32> = std::iter::from_fn(|| set.pop_last()).collect();
+        assert_eq!(rest, [699, 64, 63, 5, 3]);
+        assert_eq!(set.pop_last(), None);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::settings::{AngleSpread, SystemSettings};
 use crate::synthesis::murray;
+use crate::synthesis::tissue::TissueGrowth;
 use bevy_math::ops;
 use std::f32::consts::PI;
 
@@ -25,6 +26,8 @@ pub(crate) struct Lengths {
     pub half_bifurcation: f32,
     pub lateral_sprouts: bool,
     pub root_children: u32,
+    /// Whether the angle of sprouts beside a vessel changes from step to step although the vessel does not.
+    pub sprouts_turn: bool,
 }
 
 impl Lengths {
@@ -47,16 +50,26 @@ impl Lengths {
             half_bifurcation: murray::symmetric_half_angle(settings.bifurcation_exponent),
             lateral_sprouts: settings.lateral_sprouts,
             root_children: settings.root_children,
+            sprouts_turn: settings.scale_terminal_radius && settings.tissue_growth != TissueGrowth::None,
         }
     }
 
-    /// Side of the cells of the index over nodes: what is asked for most, yet not many cells within the influence distance.
+    /// How far a node can matter to a drain: to be heard, or to supply it.
+    pub fn reach(&self) -> f32 {
+        self.influence.max(self.kill)
+    }
+
+    /// Side of the cells of the index over nodes: a little more than what is asked for most. Empty cells cost nothing, and
+    /// in a cell of this size there is about one node.
     pub fn node_cell(&self) -> f32 {
-        self.node_birth.max(self.kill).max(0.25 * self.influence)
+        CELL * self.node_birth.max(self.kill).max(0.25 * self.influence)
     }
 
     /// Side of the cells of the index over drains.
     pub fn drain_cell(&self) -> f32 {
-        self.drain_birth.max(0.5 * self.influence)
+        CELL * self.drain_birth.max(0.25 * self.influence)
     }
 }
+
+/// Side of a cell as a share of the distance that is asked for most.
+const CELL: f32 = 1.25;

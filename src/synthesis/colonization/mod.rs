@@ -9,6 +9,7 @@
 //!
 //! What a step does depends on the settings and the seed alone: not on time, frames or the number of threads.
 
+mod candidates;
 mod direction;
 mod forest;
 mod lengths;
@@ -21,11 +22,11 @@ mod tests;
 
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
-use crate::synthesis::rng::{Stream, VesselRng};
 use crate::synthesis::roots::{RootError, Roots};
 use crate::synthesis::tissue::{Extent, Tissue, TissuePoint};
 use crate::synthesis::tree::{NodeId, System, VesselTree};
 use bevy_math::Vec3;
+use candidates::Candidates;
 use std::sync::Arc;
 use system_growth::{Ground, SystemGrowth};
 
@@ -85,10 +86,10 @@ pub struct Growth {
     tissue: Arc<dyn Tissue>,
     settings: ColonizationSettings,
     systems: [SystemGrowth; 2],
-    rng: VesselRng,
     step: u32,
-    candidates: Vec<Vec3>,
-    supplied: Vec<bool>,
+    candidates: Candidates,
+    /// Drains on their way from the arteries to the veins.
+    handed: Vec<Vec3>,
 }
 
 impl Growth {
@@ -106,8 +107,8 @@ impl Growth {
         let placed = Self::placed(tissue.as_ref(), &settings, roots, seed)?;
         let bounds = tissue.bounds();
         let systems = System::ALL.map(|system| SystemGrowth::new(settings.system(system), &bounds));
-        let rng = Stream::Attraction.rng(seed);
-        let mut growth = Self { tissue, settings, systems, rng, step: 0, candidates: Vec::new(), supplied: Vec::new() };
+        let candidates = Candidates::new(seed);
+        let mut growth = Self { tissue, settings, systems, step: 0, candidates, handed: Vec::new() };
         growth.plant(&placed, roots);
         Ok(growth)
     }
@@ -124,7 +125,7 @@ impl Growth {
             self.systems[system.index()].restart(settings.system(system), &bounds);
         }
         self.settings = settings;
-        self.rng = Stream::Attraction.rng(seed);
+        self.candidates.restart(seed);
         self.step = 0;
         self.plant(&placed, roots);
         Ok(())
@@ -151,46 +152,48 @@ impl Growth {
 
     /// Grows all vessels by one step. Does nothing once growth is finished.
     pub fn step(&mut self) -> StepReport {
+        let report = self.advance();
+        self.settle();
+        report
+    }
+
+    /// As [`step`](Self::step), but leaves the radii as they were until the next [`settle`](Self::settle): for several steps
+    /// in a row that nobody looks at in between. New nodes have the radius of a tip until then.
+    pub fn advance(&mut self) -> StepReport {
         if self.is_finished() {
             return StepReport { step: self.step, ..StepReport::default() };
         }
         self.step += 1;
-        let step = self.step;
-        let tissue = Arc::clone(&self.tissue);
-        let ground = ground(tissue.as_ref(), &self.settings, step);
-        let born = self.sample(ground.tissue);
+        let (tissue, settings, step) = (self.tissue.as_ref(), &self.settings, self.step);
         let [arteries, veins] = &mut self.systems;
-        let arterial = arteries.grow(ground, step);
-        let venous = if veins.forest.tree.is_empty() {
-            SystemReport::default()
-        } else {
-            veins.receive(arteries.supplied());
-            veins.grow(ground, step)
-        };
-        arteries.advance_tissue(step);
-        veins.advance_tissue(step);
-        StepReport { step, sampled: self.settings.samples, born, systems: [arterial, venous] }
+        let (born, arterial) = grow_arteries(arteries, &mut self.candidates, tissue, settings, step);
+        let venous = grow_veins(veins, arteries.supplied(), tissue, settings, step);
+        StepReport { step, sampled: settings.samples, born, systems: [arterial, venous] }
     }
 
-    /// Draws candidates and lets those in unsupplied tissue become drains. Their number comes back.
-    fn sample(&mut self, tissue: &dyn Tissue) -> u32 {
-        self.candidates.clear();
-        let draws = (0..self.settings.samples).filter_map(|_| tissue.sample(&mut self.rng));
-        self.candidates.extend(draws.filter(|candidate| candidate.is_finite()));
-        let arteries = &mut self.systems[System::Arterial.index()];
-        parallel::map_into(&self.candidates, &mut self.supplied, false, |&candidate| arteries.supplies(candidate));
-        let mut born = 0;
-        for (&candidate, &supplied) in self.candidates.iter().zip(&self.supplied) {
-            born += u32::from(!supplied && arteries.offer_drain(candidate));
-        }
-        born
+    /// Renews by Murray's law all radii that the steps since the last settling changed.
+    pub fn settle(&mut self) {
+        self.systems.iter_mut().for_each(|system| system.forest.settle());
     }
 
     /// Takes all steps that are left.
+    ///
+    /// Arteries never look at veins. So while the veins grow towards what the arteries supplied in one step, the arteries
+    /// take the next one, on another thread if there is one.
     pub fn run(&mut self) {
-        while !self.is_finished() {
-            self.step();
+        let (first, last) = (self.step + 1, self.settings.steps);
+        let (tissue, settings, candidates) = (self.tissue.as_ref(), &self.settings, &mut self.candidates);
+        let ([arteries, veins], handed) = (&mut self.systems, &mut self.handed);
+        for step in first..=last.saturating_add(1) {
+            parallel::join(
+                || step <= last && grow_arteries(arteries, candidates, tissue, settings, step).0 > 0,
+                || step > first && grow_veins(veins, handed, tissue, settings, step - 1).new_nodes > 0,
+            );
+            handed.clear();
+            handed.extend_from_slice(arteries.supplied());
         }
+        self.step = last;
+        self.settle();
     }
 
     /// Whether all steps have been taken.
@@ -228,7 +231,8 @@ impl Growth {
         &self.forest(system).birth_steps
     }
 
-    /// Nodes whose radius changed in the last step, new ones included, from the tips to the roots.
+    /// Nodes whose radius changed in the last step, or at the last [`settle`](Self::settle), new ones included, from the tips
+    /// to the roots.
     pub fn changed_radii(&self, system: System) -> &[u32] {
         self.forest(system).changed()
     }
@@ -271,6 +275,40 @@ impl Growth {
     fn forest(&self, system: System) -> &forest::Forest {
         &self.systems[system.index()].forest
     }
+}
+
+/// Draws candidates, lets those in unsupplied tissue become drains, and grows the arteries towards them. The number of
+/// drains born comes back.
+fn grow_arteries(
+    arteries: &mut SystemGrowth,
+    candidates: &mut Candidates,
+    tissue: &dyn Tissue,
+    settings: &ColonizationSettings,
+    step: u32,
+) -> (u32, SystemReport) {
+    let ground = ground(tissue, settings, step);
+    candidates.draw(ground.tissue, step, settings.samples, |candidate| arteries.refuses(candidate));
+    let born = candidates.iter().map(|candidate| u32::from(arteries.offer_drain(candidate))).sum();
+    let report = arteries.grow(ground, step);
+    arteries.advance_tissue(step);
+    (born, report)
+}
+
+/// Hands over the drains that the arteries `supplied` in this step, and grows the veins towards them.
+fn grow_veins(
+    veins: &mut SystemGrowth,
+    supplied: &[Vec3],
+    tissue: &dyn Tissue,
+    settings: &ColonizationSettings,
+    step: u32,
+) -> SystemReport {
+    let mut report = SystemReport::default();
+    if !veins.forest.tree.is_empty() {
+        veins.receive(supplied);
+        report = veins.grow(ground(tissue, settings, step), step);
+    }
+    veins.advance_tissue(step);
+    report
 }
 
 fn ground<'a>(tissue: &'a dyn Tissue, settings: &ColonizationSettings, step: u32) -> Ground<'a> {

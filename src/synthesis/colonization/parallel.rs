@@ -4,6 +4,26 @@
 #[cfg(feature = "parallel")]
 const WORTH_SHARING: usize = 2048;
 
+/// Does the same to every item, which is also told its index. Each item is worth a thread of its own.
+pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + Sync) {
+    #[cfg(feature = "parallel")]
+    if items.len() > 1 && rayon::current_num_threads() > 1 {
+        use rayon::prelude::*;
+        items.par_iter_mut().enumerate().for_each(|(index, item)| act(index, item));
+        return;
+    }
+    items.iter_mut().enumerate().for_each(|(index, item)| act(index, item));
+}
+
+/// Does two things, at once where there are threads.
+pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+    #[cfg(feature = "parallel")]
+    if rayon::current_num_threads() > 1 {
+        return rayon::join(a, b);
+    }
+    (a(), b())
+}
+
 /// Fills `outputs` with `map` of each input, in order. `blank` only sizes the buffer.
 pub(crate) fn map_into<I, O>(inputs: &[I], outputs: &mut Vec<O>, blank: O, map: impl Fn(&I) -> O + Sync)
 where

@@ -2,7 +2,7 @@
 
 use super::forest::Forest;
 use super::lengths::Lengths;
-use crate::synthesis::attraction::{Drains, Nearest};
+use crate::synthesis::attraction::{Drains, Found, ON_THE_NODE, cos_at};
 use bevy_math::{Vec3, ops};
 
 /// A drain that acts on a node.
@@ -25,7 +25,8 @@ pub(crate) fn is_open(forest: &Forest, lengths: &Lengths, node: u32) -> bool {
 /// Finds the drains that act in this step, sorted by node.
 ///
 /// A drain acts on its nearest open node within the influence distance, if it lies in that node's perception volume; if
-/// not, it waits. `nearest open node` is settled exactly: of two at one distance the older wins.
+/// not, it waits. `nearest open node` is settled exactly: of two at one distance the older wins. Only drains that something
+/// happened to are asked, and those that acted in the step before.
 pub(crate) fn associate(
     forest: &Forest,
     lengths: &Lengths,
@@ -36,14 +37,19 @@ pub(crate) fn associate(
     search.refresh(forest, lengths, drains);
     pulls.clear();
     let reach = lengths.influence * lengths.influence;
-    for drain in drains.slots() {
-        if let Nearest::Node(node, distance) = drains.nearest(drain)
-            && distance <= reach
-            && perceives(forest, lengths, node, drains.position(drain))
-        {
+    let mut sprout = SproutAngle::default();
+    drains.keep_awake(|drain, hearing| {
+        let Some(node) = hearing.node() else { return false };
+        if hearing.distance > reach {
+            return false;
+        }
+        let acts = perceives(forest, lengths, node, hearing.cos, &mut sprout);
+        if acts {
             pulls.push(Pull { node, drain });
         }
-    }
+        // Where tips become finer from step to step, sprouts beside a vessel leave it at ever wider angles.
+        acts || lengths.sprouts_turn && forest.children(node) == 1
+    });
     pulls.sort_unstable();
 }
 
@@ -51,48 +57,82 @@ pub(crate) fn associate(
 #[derive(Debug, Default)]
 pub(crate) struct Search {
     asking: Vec<u32>,
-    found: Vec<Nearest>,
+    found: Vec<Found>,
 }
 
 impl Search {
     fn refresh(&mut self, forest: &Forest, lengths: &Lengths, drains: &mut Drains) {
         self.asking.clear();
-        self.asking.extend(drains.slots().filter(|&drain| match drains.nearest(drain) {
-            Nearest::Unknown => true,
-            Nearest::Nobody => false,
-            Nearest::Node(node, _) => !is_open(forest, lengths, node),
-        }));
+        self.asking.extend(drains.awake().iter().filter(|&&drain| drains.is_searching(drain)));
         let shared = &*drains;
-        let find = |&drain: &u32| {
-            let center = shared.position(drain);
-            let open = |node| is_open(forest, lengths, node);
-            match forest.index().nearest_within(center, lengths.influence, open) {
-                Some((node, distance)) => Nearest::Node(node, distance),
-                None => Nearest::Nobody,
-            }
-        };
-        super::parallel::map_into(&self.asking, &mut self.found, Nearest::Unknown, find);
-        for (&drain, &nearest) in self.asking.iter().zip(&self.found) {
-            drains.set_nearest(drain, nearest);
+        let find = |&drain: &u32| nearest_open(forest, lengths, shared.position(drain));
+        super::parallel::map_into(&self.asking, &mut self.found, Found::default(), find);
+        for (&drain, &found) in self.asking.iter().zip(&self.found) {
+            drains.settle(drain, found);
         }
     }
 }
 
-/// Whether a point lies in a node's perception volume; its distance has been tested before (Eq. 2 and 3).
-fn perceives(forest: &Forest, lengths: &Lengths, node: u32, point: Vec3) -> bool {
-    if forest.is_root(node) {
+/// The nearest open node within the influence distance, and how near the nearest node of any kind is.
+fn nearest_open(forest: &Forest, lengths: &Lengths, center: Vec3) -> Found {
+    let (nearest, closest) =
+        forest.index().nearest_two(center, lengths.reach(), lengths.influence, |node| is_open(forest, lengths, node));
+    let mut found = Found { closest, ..Found::default() };
+    if let Some((node, distance)) = nearest {
+        let index = node as usize;
+        let cos = cos_at(forest.directions[index], forest.tree.positions()[index], center);
+        found = Found { node: Some(node), distance, cos, ..found };
+    }
+    found
+}
+
+/// The angle of the sprout beside a node's child, kept for the next drain of the same node.
+#[derive(Clone, Copy, Debug)]
+struct SproutAngle {
+    node: u32,
+    angle: f32,
+}
+
+impl Default for SproutAngle {
+    fn default() -> Self {
+        Self { node: u32::MAX, angle: 0.0 }
+    }
+}
+
+impl SproutAngle {
+    fn at(&mut self, forest: &Forest, node: u32) -> f32 {
+        if self.node != node {
+            *self = Self { node, angle: forest.sprout_angle(node) };
+        }
+        self.angle
+    }
+}
+
+/// Whether a drain lies in a node's perception volume; its distance has been tested before (Eq. 2 and 3). `cos` is that of
+/// the angle between the node's direction and the way to the drain.
+fn perceives(forest: &Forest, lengths: &Lengths, node: u32, cos: f32, sprout: &mut SproutAngle) -> bool {
+    if forest.is_root(node) || cos == ON_THE_NODE {
         return true;
     }
-    let index = node as usize;
-    let Some(toward) = (point - forest.tree.positions()[index]).try_normalize() else {
-        // A drain on the node itself is in front of it as much as anywhere.
-        return true;
-    };
-    let cos = forest.directions[index].dot(toward);
     if forest.children(node) == 0 {
         return cos >= lengths.cos_half_perception;
     }
-    let best = forest.sprout_angle(node, lengths.terminal_radius);
-    let angle = ops::acos(cos.clamp(-1.0, 1.0));
-    (angle - best).abs() <= lengths.half_perception
+    let angle = ops::acos(cos);
+    (angle - sprout.at(forest, node)).abs() <= lengths.half_perception
+}
+
+/// Compares the drains that act with what all drains would answer if each were asked.
+#[cfg(test)]
+pub(super) fn assert_none_sleeps_in(forest: &Forest, lengths: &Lengths, drains: &Drains, pulls: &[Pull]) {
+    let reach = lengths.influence * lengths.influence;
+    let asked = drains.slots().filter_map(|drain| {
+        let hearing = drains.hearing(drain);
+        let node = hearing.node().filter(|_| hearing.distance <= reach)?;
+        let (position, direction) = (forest.tree.positions()[node as usize], forest.directions[node as usize]);
+        let cos = cos_at(direction, position, drains.position(drain));
+        perceives(forest, lengths, node, cos, &mut SproutAngle::default()).then_some(Pull { node, drain })
+    });
+    let mut expected: Vec<Pull> = asked.collect();
+    expected.sort_unstable();
+    assert_eq!(pulls, expected);
 }

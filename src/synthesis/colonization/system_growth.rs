@@ -7,8 +7,6 @@ use super::lengths::Lengths;
 use super::perception::{self, Pull, Search};
 use super::settings::SystemSettings;
 use crate::synthesis::attraction::Drains;
-#[cfg(test)]
-use crate::synthesis::attraction::Nearest;
 use crate::synthesis::tissue::{Tissue, TissuePoint};
 use crate::synthesis::tree::{NO_PARENT, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d};
@@ -45,8 +43,9 @@ pub(crate) struct SystemGrowth {
     settings: SystemSettings,
     search: Search,
     pulls: Vec<Pull>,
-    /// Positions of the drains that pull at one node.
+    /// Positions of the drains that pull at one node, and the angles under which it sees them.
     pulling: Vec<Vec3>,
+    angles: Vec<f32>,
     /// Drains supplied in the last step.
     supplied: Vec<Vec3>,
 }
@@ -69,6 +68,7 @@ impl SystemGrowth {
             search: Search::default(),
             pulls: Vec::new(),
             pulling: Vec::new(),
+            angles: Vec::new(),
             supplied: Vec::new(),
         };
         system.restart(settings, bounds);
@@ -97,25 +97,28 @@ impl SystemGrowth {
                 let at = TissuePoint { position, normal: ground.tissue.closest_point(position).normal };
                 match parent {
                     NO_PARENT => self.forest.add_root(at, radius),
-                    parent => _ = self.forest.add_child(first + parent, at, radius, 0),
+                    parent => self.forest.add_given(first + parent, at, radius),
                 }
             }
         }
-        self.forest.sweep(0);
+        self.forest.sum_up(|_| ());
+        self.forest.settle();
     }
 
-    /// Takes a candidate drain, unless it lies in supplied tissue (`supplied`) or too near another drain.
-    pub fn offer_drain(&mut self, position: Vec3) -> bool {
-        let born = !self.drains.any_within(position, self.lengths.drain_birth);
+    /// Whether a candidate cannot become a drain: it lies in supplied tissue, within the birth distance of a node, or too
+    /// near a drain.
+    pub fn refuses(&self, candidate: Vec3) -> bool {
+        self.drains.index().any_within(candidate, self.lengths.drain_birth)
+            || self.forest.index().any_within(candidate, self.lengths.node_birth)
+    }
+
+    /// Lets a candidate that has not been refused become a drain, unless one has been born too near it meanwhile.
+    pub fn offer_drain(&mut self, candidate: Vec3) -> bool {
+        let born = !self.drains.index().any_within(candidate, self.lengths.drain_birth);
         if born {
-            self.drains.add(position);
+            self.drains.add(candidate);
         }
         born
-    }
-
-    /// Whether tissue at a point is supplied: within the birth distance of a node.
-    pub fn supplies(&self, position: Vec3) -> bool {
-        self.forest.index().any_within(position, self.lengths.node_birth)
     }
 
     /// Takes drains that the other system has supplied.
@@ -130,9 +133,10 @@ impl SystemGrowth {
         &self.supplied
     }
 
-    /// One step of growth.
+    /// One step of growth. Radii are right after the next [`settle`](Forest::settle).
     pub fn grow(&mut self, ground: Ground<'_>, step: u32) -> SystemReport {
-        let first_new = self.forest.tree.len();
+        let first_new = self.forest.tree.len() as u32;
+        self.forest.set_tip_radius(self.lengths.terminal_radius);
         perception::associate(&self.forest, &self.lengths, &mut self.drains, &mut self.search, &mut self.pulls);
         let mut start = 0;
         while start < self.pulls.len() {
@@ -140,7 +144,7 @@ impl SystemGrowth {
             let end = start + self.pulls[start..].iter().take_while(|pull| pull.node == node).count();
             self.pulling.clear();
             self.pulling.extend(self.pulls[start..end].iter().map(|pull| self.drains.position(pull.drain)));
-            match decide(&self.forest, &self.lengths, node, &self.pulling) {
+            match decide(&self.forest, &self.lengths, node, &self.pulling, &mut self.angles) {
                 Decision::Extend(direction) => self.extend(node, direction, ground, step),
                 Decision::Bifurcate(directions) => {
                     for direction in directions {
@@ -151,16 +155,11 @@ impl SystemGrowth {
             }
             start = end;
         }
-        self.announce(first_new);
+        self.spread_news(first_new);
         self.kill();
-        if self.forest.tree.len() > first_new {
-            self.forest.sweep(first_new);
-        } else {
-            self.forest.clear_changed();
-        }
         SystemReport {
-            first_new_node: first_new as u32,
-            new_nodes: (self.forest.tree.len() - first_new) as u32,
+            first_new_node: first_new,
+            new_nodes: self.forest.tree.len() as u32 - first_new,
             supplied: self.supplied.len() as u32,
             drains_left: self.drains.len() as u32,
         }
@@ -173,37 +172,46 @@ impl SystemGrowth {
         let free = at.position.is_finite()
             && !self.forest.index().any_within(at.position, LEAST_SEPARATION * self.lengths.step);
         if free {
-            self.forest.add_child(node, at, self.lengths.terminal_radius, step);
+            self.forest.add_tip(node, at, step);
         }
     }
 
-    /// Makes new nodes known to the drains around them.
-    fn announce(&mut self, first_new: usize) {
-        for node in first_new..self.forest.tree.len() {
-            let position = self.forest.tree.positions()[node];
-            self.drains.announce(node as u32, position, self.lengths.influence);
+    /// Wakes the drains to which something has happened: nodes that have children now or another sprout angle, and new
+    /// nodes within reach.
+    fn spread_news(&mut self, first_new: u32) {
+        let Self { forest, drains, lengths, .. } = self;
+        let nodes = forest.tree.len() as u32;
+        for node in first_new..nodes {
+            let parent = forest.tree.parents()[node as usize];
+            drains.wake(parent, !perception::is_open(forest, lengths, parent));
+        }
+        forest.sum_up(|node| drains.wake(node, false));
+        for node in first_new..nodes {
+            let index = node as usize;
+            drains.announce(node, forest.tree.positions()[index], forest.directions[index], lengths.reach());
         }
     }
 
     /// Removes the drains that acted in this step and now have a node within the kill distance.
     fn kill(&mut self) {
         self.supplied.clear();
+        let reach = self.lengths.kill * self.lengths.kill;
         for &Pull { drain, .. } in &self.pulls {
-            let position = self.drains.position(drain);
-            if self.forest.index().any_within(position, self.lengths.kill) {
+            if self.drains.hearing(drain).closest <= reach {
+                self.supplied.push(self.drains.position(drain));
                 self.drains.remove(drain);
-                self.supplied.push(position);
             }
         }
+        self.drains.forget_the_gone();
     }
 
     /// Lets the tissue grow, which shortens all lengths relative to it.
     pub fn advance_tissue(&mut self, step: u32) {
         self.size = self.settings.tissue_growth.advance(self.size, step);
-        let before = self.lengths.influence;
+        let before = self.lengths.reach();
         self.lengths = Lengths::at_size(&self.settings, self.size);
-        if self.lengths.influence > before {
-            self.drains.forget_nearest();
+        if self.lengths.reach() > before {
+            self.drains.wake_all();
         }
         if !FITTING_CELLS.contains(&(self.lengths.node_cell() / self.forest.index().cell())) {
             self.forest.resize_cells(self.lengths.node_cell());
@@ -224,6 +232,7 @@ impl SystemGrowth {
     /// Compares what the drains know of their nearest open node with every drain asking every node.
     pub(crate) fn assert_association_exact(&mut self) {
         perception::associate(&self.forest, &self.lengths, &mut self.drains, &mut self.search, &mut self.pulls);
+        perception::assert_none_sleeps_in(&self.forest, &self.lengths, &self.drains, &self.pulls);
         let positions = self.forest.tree.positions();
         let reach = self.lengths.influence * self.lengths.influence;
         for drain in self.drains.slots() {
@@ -233,33 +242,12 @@ impl SystemGrowth {
                 .map(|node| (positions[node as usize].distance_squared(at), node))
                 .filter(|&(distance, _)| distance <= reach)
                 .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let known = match self.drains.nearest(drain) {
-                Nearest::Node(node, distance) if distance <= reach => Some((distance, node)),
-                _ => None,
-            };
+            let hearing = self.drains.hearing(drain);
+            let known = hearing.node().map(|node| (hearing.distance, node)).filter(|&(distance, _)| distance <= reach);
             assert_eq!(known, nearest, "drain {drain}");
+            let closest = positions.iter().map(|node| node.distance_squared(at)).fold(f32::INFINITY, f32::min);
+            let kill = self.lengths.kill * self.lengths.kill;
+            assert_eq!(hearing.closest <= kill, closest <= kill, "drain {drain}");
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::synthesis::murray;
-
-    #[test]
-    fn radii_of_a_tree_come_from_its_tips() {
-        let settings = SystemSettings::default();
-        let mut system = SystemGrowth::new(&settings, &Aabb3d::new(Vec3::ZERO, Vec3::ONE));
-        let at = |x: f32| TissuePoint { position: Vec3::X * x, normal: Vec3::ZERO };
-        system.forest.add_root(at(0.0), 0.01);
-        for (parent, x) in [(0, 0.1), (1, 0.2), (1, 0.3)] {
-            system.forest.add_child(parent, at(x), 0.01, 0);
-        }
-        system.forest.sweep(0);
-        let radii = system.forest.tree.radii();
-        let expected = murray::parent_radius(0.01, 0.01, settings.bifurcation_exponent);
-        assert!((radii[1] - expected).abs() < 1e-7 && (radii[0] - expected).abs() < 1e-7);
-        assert!((radii[2] - 0.01).abs() < 1e-8);
     }
 }

@@ -18,6 +18,7 @@
 
 pub mod bvh;
 pub mod density;
+mod draws;
 mod error;
 pub mod growth;
 pub mod mask;
@@ -103,6 +104,12 @@ pub trait Tissue: Debug + Send + Sync {
     /// `None` when this draw fell on nothing: beside the tissue, on a spot that its density field turned down, or on a
     /// tissue of no size. The caller counts it as a sample all the same.
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3>;
+
+    /// Appends `count` candidates, less those that fell on nothing: as many calls of [`sample`](Self::sample), unless the
+    /// tissue knows a faster way to draw many.
+    fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
+        candidates.extend((0..count).filter_map(|_| self.sample(rng)));
+    }
 
     /// Where vessels enter the tissue of themselves, if there is such a place: the beginning of a guide.
     fn entrance(&self) -> Option<Vec3> {

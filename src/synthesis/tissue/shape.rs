@@ -2,7 +2,7 @@
 //! solids.
 
 use super::{
-    Extent, Tissue, TissuePoint,
+    Extent, Tissue, TissuePoint, draws,
     error::{TissueError, finite_point, positive},
 };
 use crate::synthesis::rng::VesselRng;
@@ -39,6 +39,14 @@ pub(super) fn in_unit_disc(rng: &mut VesselRng) -> Option<Vec2> {
 /// A point drawn evenly from the unit ball.
 pub(super) fn in_unit_ball(rng: &mut VesselRng) -> Option<Vec3> {
     (0..TRIES).map(|_| Vec3::new(signed(rng), signed(rng), signed(rng))).find(|point| point.length_squared() <= 1.0)
+}
+
+/// Appends points drawn evenly from the unit ball, each where `place` puts it.
+fn draw_in_ball(rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>, place: impl Fn(Vec3) -> Vec3) {
+    draws::draw(rng, count, candidates, |words| {
+        let point = Vec3::from(words.map(draws::signed));
+        (point.length_squared() <= 1.0).then(|| place(point))
+    });
 }
 
 /// A flat disc, the tissue of the paper's examples.
@@ -124,6 +132,13 @@ impl Tissue for Disc {
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         Some(self.at(in_unit_disc(rng)? * self.radius))
+    }
+
+    fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
+        draws::draw(rng, count, candidates, |words| {
+            let point = Vec2::from(words.map(draws::signed));
+            (point.length_squared() <= 1.0).then(|| self.at(point * self.radius))
+        });
     }
 }
 
@@ -256,6 +271,10 @@ impl Tissue for Ball {
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         Some(self.center + in_unit_ball(rng)? * self.radius)
     }
+
+    fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
+        draw_in_ball(rng, count, candidates, |point| self.center + point * self.radius);
+    }
 }
 
 /// A solid box along the axes.
@@ -299,6 +318,12 @@ impl Tissue for Cuboid {
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         Some(self.center + self.half * Vec3::new(signed(rng), signed(rng), signed(rng)))
+    }
+
+    fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
+        draws::draw(rng, count, candidates, |words| {
+            Some(self.center + self.half * Vec3::from(words.map(draws::signed)))
+        });
     }
 }
 
@@ -347,6 +372,10 @@ impl Tissue for Ellipsoid {
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         // A uniform ball stays uniform when it is stretched.
         Some(self.center + in_unit_ball(rng)? * self.half)
+    }
+
+    fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
+        draw_in_ball(rng, count, candidates, |point| self.center + point * self.half);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The surface of an organ's mesh as a tissue.
 
 use super::{
-    Extent, Tissue, TissuePoint,
+    Extent, Tissue, TissuePoint, draws,
     error::TissueError,
     triangle::{SurfacePoint, TriangleIndex},
 };
@@ -91,6 +91,20 @@ impl MeshSurface {
     }
 }
 
+impl MeshSurface {
+    /// The point that four even numbers choose: a slot of the table, whether to stay with it, and two in the triangle.
+    fn pick(&self, slot: u32, keep: f32, [mut v, mut w]: [f32; 2]) -> Vec3 {
+        let pick = self.picks[slot as usize];
+        let triangle = if keep < pick.keep { slot } else { pick.other };
+        let [a, b, c] = self.mesh.corners(triangle as usize);
+        // Evenly over the parallelogram, its far half folded back.
+        if v + w > 1.0 {
+            (v, w) = (1.0 - v, 1.0 - w);
+        }
+        a + (b - a) * v + (c - a) * w
+    }
+}
+
 impl Tissue for MeshSurface {
     fn bounds(&self) -> Aabb3d {
         self.bounds
@@ -117,15 +131,16 @@ impl Tissue for MeshSurface {
             return None;
         }
         let slot = rng.random_range(0..self.picks.len() as u32);
-        let pick = self.picks[slot as usize];
-        let triangle = if rng.random::<f32>() < pick.keep { slot } else { pick.other };
-        let [a, b, c] = self.mesh.corners(triangle as usize);
-        // Evenly over the parallelogram, its far half folded back.
-        let (mut v, mut w) = (rng.random::<f32>(), rng.random::<f32>());
-        if v + w > 1.0 {
-            (v, w) = (1.0 - v, 1.0 - w);
+        Some(self.pick(slot, rng.random(), [rng.random(), rng.random()]))
+    }
+
+    fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
+        let slots = self.picks.len() as u32;
+        if slots > 0 {
+            draws::draw(rng, count, candidates, |[slot, keep, v, w]| {
+                Some(self.pick(draws::below(slot, slots), draws::unit(keep), [draws::unit(v), draws::unit(w)]))
+            });
         }
-        Some(a + (b - a) * v + (c - a) * w)
     }
 }
 
