@@ -47,8 +47,10 @@
 //! # }
 //! ```
 
+mod alias;
 mod attraction;
 pub mod colonization;
+mod draws;
 pub mod instances;
 pub mod io;
 pub mod mesh;
