@@ -1,0 +1,5 @@
+//! Cuts against brute force: what a blade severs, the ledger of wounds, and what is left to draw.
+
+mod common;
+mod crossings;
+mod degenerate;
