@@ -22,16 +22,16 @@ fn random_blade(rng: &mut VesselRng, kind: usize, place: impl Fn(Vec3) -> Vec3) 
         0 => {
             let (u, v) = (b - a, c - a);
             let [e, f, g, h] = [a - u - v, a + u - v, a + u + v, a - u + v];
-            (Blade::rectangle(a, u, v).unwrap(), Twin::Triangles(vec![[e, f, g], [e, g, h]]))
+            (Blade::rectangle(a, u, v).expect("a blade"), Twin::Triangles(vec![[e, f, g], [e, g, h]]))
         }
-        1 => (Blade::disc(a, b - a, 2.0 * radius).unwrap(), Twin::Disc(a, b - a, 2.0 * radius)),
-        2 => (Blade::sweep([a, b], [c, d]).unwrap(), Twin::Triangles(vec![[a, b, d], [a, d, c]])),
+        1 => (Blade::disc(a, b - a, 2.0 * radius).expect("a blade"), Twin::Disc(a, b - a, 2.0 * radius)),
+        2 => (Blade::sweep([a, b], [c, d]).expect("a blade"), Twin::Triangles(vec![[a, b, d], [a, d, c]])),
         3 => {
             let triangles: Vec<_> = (0..7).map(|_| [point(), point(), point()]).collect();
-            (Blade::triangles(triangles.clone()).unwrap(), Twin::Triangles(triangles))
+            (Blade::triangles(triangles.clone()).expect("a blade"), Twin::Triangles(triangles))
         }
-        4 => (Blade::ball(a, radius).unwrap(), Twin::Capsule(a, a, radius)),
-        _ => (Blade::capsule(a, c, radius).unwrap(), Twin::Capsule(a, c, radius)),
+        4 => (Blade::ball(a, radius).expect("a blade"), Twin::Capsule(a, a, radius)),
+        _ => (Blade::capsule(a, c, radius).expect("a blade"), Twin::Capsule(a, c, radius)),
     }
 }
 
@@ -139,7 +139,7 @@ fn as_f64(transform: &Affine3A) -> DAffine3 {
 
 /// Compares one blade on one tree; returns crossings and undecided segments.
 fn compare(blade: &Blade, twin_blade: &Twin, tree: &VesselTree, to_world: &Affine3A, case: &str) -> (usize, usize) {
-    let local = blade.to_local(to_world).unwrap();
+    let local = blade.to_local(to_world).expect("a transform that can be undone");
     let mut found = Vec::new();
     severed(&local, tree, all(tree), &mut found);
     let to_world = as_f64(to_world);

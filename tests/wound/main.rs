@@ -3,3 +3,6 @@
 mod common;
 mod crossings;
 mod degenerate;
+mod ledger;
+mod random_actions;
+mod stumps;

@@ -55,6 +55,18 @@ pub enum EndSide {
     Distal,
 }
 
+/// An end as it lies on its segment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct End {
+    /// Its index in the ledger.
+    pub index: u32,
+    pub side: EndSide,
+    /// Share of the segment at which its tip is.
+    pub along: f32,
+    /// Whether it is not sealed, and nothing closes the piece that it ends.
+    pub is_open: bool,
+}
+
 /// All that has happened to a segment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Injury {
@@ -288,12 +300,12 @@ impl Injury {
         self.closures.insert(at, Closure { from, to, kind: ClosureKind::Seal });
     }
 
-    /// Every end of the segment, from parent to node: its index, side, share, and whether its lumen is open. It is closed
-    /// when sealed, and while anything closes the piece that it ends.
-    pub fn ends(&self) -> impl Iterator<Item = (u32, EndSide, f32, bool)> + '_ {
+    /// Every end of the segment, from parent to node.
+    pub fn ends(&self) -> impl Iterator<Item = End> + '_ {
         self.gaps.iter().enumerate().flat_map(move |(index, gap)| {
-            let end = move |tip: Tip, side, share, piece| {
-                (tip.end, side, share, !tip.sealed && self.closures_of(piece).next().is_none())
+            let end = move |tip: Tip, side, along, piece| {
+                let is_open = !tip.sealed && self.closures_of(piece).next().is_none();
+                End { index: tip.end, side, along, is_open }
             };
             let proximal = gap.proximal.map(|tip| end(tip, EndSide::Proximal, gap.from, index));
             let distal = gap.distal.map(|tip| end(tip, EndSide::Distal, gap.to, index + 1));

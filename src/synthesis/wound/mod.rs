@@ -48,6 +48,7 @@ mod error;
 mod injury;
 mod orientation;
 mod report;
+mod retraction;
 mod stumps;
 mod wounds;
 
@@ -56,5 +57,6 @@ pub use crossing::{Severed, severed};
 pub use error::WoundError;
 pub use injury::EndSide;
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
+pub use retraction::Retraction;
 pub use stumps::{Blockage, Piece, PieceKind, write_stumps, write_stumps_of};
-pub use wounds::{Retraction, Wounds};
+pub use wounds::Wounds;

@@ -2,61 +2,11 @@
 
 use super::blade::Shape;
 use super::crossing::{Severed, segment, severed, within};
-use super::injury::{ClosureKind, EndSide, Injury, Removal};
-use super::{Blade, BladeError, ClampId, EndId, SeveredEnd, WoundError, WoundReport};
+use super::injury::{ClosureKind, End, EndSide, Injury, Removal};
+use super::{Blade, BladeError, ClampId, EndId, Retraction, SeveredEnd, WoundError, WoundReport};
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
 use bevy_math::Vec3;
 use std::collections::BTreeMap;
-
-/// How far severed ends draw back along their vessel.
-///
-/// An end stays on its segment, and keeps more than half of the piece that it ends: a piece between two cuts never
-/// vanishes. A clamp, a tie or the next node holds it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
-pub struct Retraction {
-    /// How far an end draws back, as a multiple of the vessel's radius.
-    ///
-    /// Higher values open wider gaps, the wider the thicker the vessel.
-    ///
-    /// Limits: ≥ 0. Default: [`Self::DEFAULT_RADII`].
-    pub radii: f32,
-    /// How far it draws back beside that, whatever its radius.
-    ///
-    /// Higher values make gaps in the thinnest vessels visible, too.
-    ///
-    /// Units: tissue lengths. Limits: ≥ 0. Default: [`Self::DEFAULT_LENGTH`].
-    pub length: f32,
-}
-
-impl Retraction {
-    /// Half again the radius: a gap three radii wide, which is seen, and is no further than a vessel held by its tissue
-    /// may go.
-    pub const DEFAULT_RADII: f32 = 1.5;
-    /// Nothing beside.
-    pub const DEFAULT_LENGTH: f32 = 0.0;
-
-    /// Passes settings within their limits.
-    ///
-    /// # Errors
-    /// The first value outside.
-    pub fn validate(&self) -> Result<(), WoundError> {
-        for (what, value) in [("radii", self.radii), ("length", self.length)] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(WoundError::Retraction { what, value });
-            }
-        }
-        Ok(())
-    }
-}
-
-impl Default for Retraction {
-    fn default() -> Self {
-        Self { radii: Self::DEFAULT_RADII, length: Self::DEFAULT_LENGTH }
-    }
-}
 
 /// All that was done to one tree.
 ///
@@ -273,17 +223,16 @@ impl Wounds {
     pub fn end(&self, id: EndId, tree: &VesselTree) -> Option<SeveredEnd> {
         let record = self.ends.get(id.index as usize).filter(|record| record.generation == id.generation)?;
         let injury = self.injuries.get(&record.node)?;
-        let (_, side, along, is_open) = injury.ends().find(|&(end, ..)| end == id.index)?;
-        locate(tree, Place::new(NodeId(record.node), along), id, side, is_open)
+        let end = injury.ends().find(|end| end.index == id.index)?;
+        self.locate(tree, record.node, end)
     }
 
     /// All severed ends, open or not, where they are now: in the order of the nodes, then from parent to node.
     pub fn ends<'a>(&'a self, tree: &'a VesselTree) -> impl Iterator<Item = SeveredEnd> + 'a {
-        self.injuries.iter().flat_map(move |(&node, injury)| {
-            injury.ends().filter_map(move |(end, side, along, is_open)| {
-                locate(tree, Place::new(NodeId(node), along), self.end_id(end), side, is_open)
-            })
-        })
+        let of_segment = move |(&node, injury): (&u32, &'a Injury)| {
+            injury.ends().filter_map(move |end| self.locate(tree, node, end))
+        };
+        self.injuries.iter().flat_map(of_segment)
     }
 
     /// Where a clamp sits; `None` where it is no longer on.
@@ -335,18 +284,15 @@ impl Wounds {
 
     /// Changes one segment. `change` says whether it did; what it makes without doing so must be nothing.
     fn change(&mut self, node: u32, change: impl FnOnce(&mut Injury, &mut Made) -> bool) {
-        let before = self.injuries.get(&node).cloned().unwrap_or_default();
+        let before = self.injuries.remove(&node).unwrap_or_default();
         let mut injury = before.clone();
-        let generation = self.generation + 1;
-        let mut made = Made { record: Record { node, generation }, ends: &mut self.ends, clamps: &mut self.clamps };
-        if !change(&mut injury, &mut made) {
-            return;
-        }
-        self.before.push((node, before));
-        if injury.is_empty() {
-            self.injuries.remove(&node);
-        } else {
+        let record = Record { node, generation: self.generation + 1 };
+        let changed = change(&mut injury, &mut Made { record, ends: &mut self.ends, clamps: &mut self.clamps });
+        if !injury.is_empty() {
             self.injuries.insert(node, injury);
+        }
+        if changed {
+            self.before.push((node, before));
         }
     }
 
@@ -368,14 +314,15 @@ impl Wounds {
 
     /// Adds to a report what became of one segment.
     fn compare(&self, tree: &VesselTree, node: u32, before: &Injury, now: &Injury, report: &mut WoundReport) {
-        let was_open = |end: u32| before.ends().any(|(other, .., open)| open && other == end);
-        let stays_open = |end: u32| now.ends().any(|(other, .., open)| open && other == end);
-        let opened = now.ends().filter(|&(end, .., open)| open && !was_open(end));
-        report.opened.extend(opened.filter_map(|(end, side, along, open)| {
-            locate(tree, Place::new(NodeId(node), along), self.end_id(end), side, open)
-        }));
-        let closed = before.ends().filter(|&(end, .., open)| open && !stays_open(end));
-        report.closed.extend(closed.map(|(end, ..)| self.end_id(end)));
+        let [was_open, stays_open] = [before, now].map(|injury| {
+            let mut open: Vec<u32> = injury.ends().filter(|end| end.is_open).map(|end| end.index).collect();
+            open.sort_unstable();
+            open
+        });
+        let opened = now.ends().filter(|end| end.is_open && was_open.binary_search(&end.index).is_err());
+        report.opened.extend(opened.filter_map(|end| self.locate(tree, node, end)));
+        let closed = before.ends().filter(|end| end.is_open && stays_open.binary_search(&end.index).is_err());
+        report.closed.extend(closed.map(|end| self.end_id(end.index)));
         let clamp_id = |index: u32| ClampId { index, generation: self.clamps[index as usize].generation };
         let lacking = |here: &Injury, there: &Injury| -> Vec<ClampId> {
             here.clamps().filter(|&clamp| there.clamps().all(|other| other != clamp)).map(clamp_id).collect()
@@ -383,6 +330,23 @@ impl Wounds {
         report.clamped.extend(lacking(now, before));
         report.unclamped.extend(lacking(before, now));
         report.changed.push(NodeId(node));
+    }
+
+    /// A severed end as it lies in the tree; `None` where the tree has no such segment.
+    fn locate(&self, tree: &VesselTree, node: u32, end: End) -> Option<SeveredEnd> {
+        let place = Place::new(NodeId(node), end.along);
+        let [start, stop] = segment(tree, place.node)?;
+        // In f64, since a segment may be too short for the square of its length in f32.
+        let along = (stop.as_dvec3() - start.as_dvec3()).normalize_or_zero().as_vec3();
+        Some(SeveredEnd {
+            id: self.end_id(end.index),
+            place,
+            side: end.side,
+            is_open: end.is_open,
+            position: tree.position_at(place),
+            direction: if end.side == EndSide::Proximal { along } else { -along },
+            radius: tree.radii()[place.node.index()],
+        })
     }
 
     /// Retraction as a share of a segment.
@@ -409,22 +373,6 @@ impl Made<'_> {
         self.clamps.push(self.record);
         self.clamps.len() as u32 - 1
     }
-}
-
-/// A severed end as it lies in the tree; `None` where the tree has no such segment.
-fn locate(tree: &VesselTree, place: Place, id: EndId, side: EndSide, is_open: bool) -> Option<SeveredEnd> {
-    let [parent, end] = segment(tree, place.node)?;
-    // In f64, since a segment may be too short for the square of its length in f32.
-    let along = (end.as_dvec3() - parent.as_dvec3()).normalize_or_zero().as_vec3();
-    Some(SeveredEnd {
-        id,
-        place,
-        side,
-        is_open,
-        position: tree.position_at(place),
-        direction: if side == EndSide::Proximal { along } else { -along },
-        radius: tree.radii()[place.node.index()],
-    })
 }
 
 /// Passes a place on a segment of the tree.
