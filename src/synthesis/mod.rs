@@ -62,3 +62,4 @@ pub mod rng;
 pub mod roots;
 pub mod tissue;
 pub mod tree;
+pub mod wound;

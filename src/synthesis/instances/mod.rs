@@ -81,7 +81,7 @@ pub fn write_segments(
     let mut bounds: Option<Aabb3d> = None;
     for (slot, node) in used.iter_mut().zip(range) {
         let birth = birth_steps.get(node).copied().unwrap_or(0);
-        *slot = segment(tree, node, birth, colors);
+        *slot = segment_instance(tree, node, birth, colors);
         if slot.is_visible() {
             let own = slot.bounds();
             bounds = Some(bounds.map_or(own, |all| Aabb3d { min: all.min.min(own.min), max: all.max.max(own.max) }));
@@ -97,13 +97,14 @@ pub fn write_segments(
 pub fn segment_bounds(tree: &VesselTree, range: Range<usize>) -> Option<Aabb3d> {
     let colors = SegmentColors::Uniform([0.0; 3]);
     range
-        .map(|node| segment(tree, node, 0, &colors))
+        .map(|node| segment_instance(tree, node, 0, &colors))
         .filter(SegmentInstance::is_visible)
         .map(|segment| segment.bounds())
         .reduce(|a, b| Aabb3d { min: a.min.min(b.min), max: a.max.max(b.max) })
 }
 
-fn segment(tree: &VesselTree, node: usize, birth: u32, colors: &SegmentColors) -> SegmentInstance {
+/// The record of one node.
+pub(crate) fn segment_instance(tree: &VesselTree, node: usize, birth: u32, colors: &SegmentColors) -> SegmentInstance {
     let parent = tree.parents()[node];
     if parent == NO_PARENT {
         return SegmentInstance::HIDDEN;

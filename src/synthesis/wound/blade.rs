@@ -1,0 +1,311 @@
+//! What cuts: blade shapes, checked once, and how they are brought into the space of an organ.
+//!
+//! Two kinds. A **surface** (rectangle, disc, swept edge, triangles) severs a vessel where its centre line passes through.
+//! A **volume** (ball, capsule) takes out all that lies within, and severs what passes its boundary.
+//!
+//! A blade comes in the space of the caller, mostly the world. [`Blade::to_local`] brings it into an organ's space, where
+//! the vessels are. Triangles go over corner by corner. Curved shapes keep the map from the new space back to the one
+//! they were given in and are asked there, so a ball stays a ball of the world under non-uniform scale, mirrors and
+//! shears.
+
+use bevy_math::{Affine3A, DAffine3, DMat3, DVec3, Vec3};
+
+/// Why a blade cannot cut.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BladeError {
+    /// A coordinate or size that is infinite or not a number.
+    #[error("{what} of the blade is {value}; it must be a finite number")]
+    NotFinite {
+        /// Which one.
+        what: &'static str,
+        /// The value found.
+        value: f32,
+    },
+    /// A radius that is zero or negative.
+    #[error("{what} of the blade is {value}; it must be above 0")]
+    NotPositive {
+        /// Which one.
+        what: &'static str,
+        /// The value found.
+        value: f32,
+    },
+    /// A surface without area, such as an edge that has not moved.
+    #[error(
+        "the blade has no area: the corners of each of its {triangles} triangles lie on a line; skip edges that have not moved"
+    )]
+    NoArea {
+        /// Number of triangles.
+        triangles: usize,
+    },
+    /// A cutter without triangles.
+    #[error("the blade has no triangles; give at least one")]
+    NoTriangles,
+    /// A disc whose plane is not given.
+    #[error("the normal of the disc has no length; give the direction in which it faces")]
+    NoNormal,
+    /// A transform that flattens space, or is no number.
+    #[error(
+        "the organ's transform has determinant {determinant}; it must be finite and not 0: give every axis a scale"
+    )]
+    Singular {
+        /// Its determinant.
+        determinant: f64,
+    },
+    /// An action that needs a ball or capsule.
+    #[error("the blade is a surface and holds nothing; cauterise with a ball or a capsule")]
+    NotAVolume,
+}
+
+/// A shape that cuts.
+///
+/// A surface blade owns its edges and corners: a centre line that passes exactly through one is severed, once, however
+/// many triangles meet there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blade {
+    pub(super) shape: Shape,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Shape {
+    /// Corners in the present space.
+    Triangles(Vec<[Vec3; 3]>),
+    Disc(Disc),
+    Volume(Volume),
+}
+
+/// The maps between the present space and the one that a shape was given in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Frame {
+    /// From the present space to the shape's.
+    pub inward: DAffine3,
+    /// From the shape's space to the present one.
+    outward: DAffine3,
+}
+
+/// A flat round blade.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Disc {
+    pub center: DVec3,
+    /// Of length 1.
+    pub normal: DVec3,
+    pub radius: f64,
+    pub frame: Frame,
+}
+
+/// All within a distance of a line; of a point, where both ends are one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Volume {
+    pub from: DVec3,
+    pub to: DVec3,
+    pub radius: f64,
+    pub frame: Frame,
+}
+
+impl Blade {
+    /// A flat rectangle: its centre, and from there to the middles of two neighbouring sides.
+    ///
+    /// Vectors that are not perpendicular make a parallelogram. Units: those of the caller's space.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite; vectors that span no area.
+    pub fn rectangle(center: Vec3, half_width: Vec3, half_height: Vec3) -> Result<Self, BladeError> {
+        let [a, b] = [center - half_width, center + half_width];
+        Self::sweep([a - half_height, b - half_height], [a + half_height, b + half_height])
+    }
+
+    /// A flat disc. The normal may have any length.
+    ///
+    /// # Errors
+    /// A number that is not finite, a radius that is not above 0, a normal without length.
+    pub fn disc(center: Vec3, normal: Vec3, radius: f32) -> Result<Self, BladeError> {
+        finite_point("the centre", center)?;
+        finite_point("the normal", normal)?;
+        let radius = positive("the radius", radius)?;
+        let normal = normal.as_dvec3().try_normalize().ok_or(BladeError::NoNormal)?;
+        let disc = Disc { center: center.as_dvec3(), normal, radius, frame: Frame::IDENTITY };
+        Ok(Self { shape: Shape::Disc(disc) })
+    }
+
+    /// The way of a straight edge between two frames, such as a scalpel's: from where its two ends were to where they
+    /// are.
+    ///
+    /// The way is two triangles that share the diagonal from the first end before to the second end after; where the edge
+    /// also turned, they are what passes for its curved way. Sweeps of successive frames share their edges exactly, so
+    /// nothing slips through between them. An edge that turns about one of its ends sweeps one triangle.
+    ///
+    /// # Errors
+    /// A coordinate that is not finite; an edge without length, or one that has not moved sideways.
+    pub fn sweep(before: [Vec3; 2], after: [Vec3; 2]) -> Result<Self, BladeError> {
+        Self::triangles(vec![[before[0], before[1], after[1]], [before[0], after[1], after[0]]])
+    }
+
+    /// Any triangles, such as those of a cutter's mesh: open or closed, in any order and winding. Those without area cut
+    /// nothing.
+    ///
+    /// # Errors
+    /// No triangle; a coordinate that is not finite; not one triangle with an area.
+    pub fn triangles(triangles: Vec<[Vec3; 3]>) -> Result<Self, BladeError> {
+        if triangles.is_empty() {
+            return Err(BladeError::NoTriangles);
+        }
+        for &corner in triangles.as_flattened() {
+            finite_point("a corner", corner)?;
+        }
+        if !triangles.iter().any(has_area) {
+            return Err(BladeError::NoArea { triangles: triangles.len() });
+        }
+        Ok(Self { shape: Shape::Triangles(triangles) })
+    }
+
+    /// All within `radius` of a point: the tip of an ultrasonic or bipolar instrument.
+    ///
+    /// # Errors
+    /// A number that is not finite, a radius that is not above 0.
+    pub fn ball(center: Vec3, radius: f32) -> Result<Self, BladeError> {
+        Self::capsule(center, center, radius)
+    }
+
+    /// All within `radius` of a line, such as the jaws of an instrument or the way of its tip in a frame.
+    ///
+    /// # Errors
+    /// A number that is not finite, a radius that is not above 0.
+    pub fn capsule(from: Vec3, to: Vec3, radius: f32) -> Result<Self, BladeError> {
+        finite_point("an end", from)?;
+        finite_point("an end", to)?;
+        let radius = positive("the radius", radius)?;
+        let volume = Volume { from: from.as_dvec3(), to: to.as_dvec3(), radius, frame: Frame::IDENTITY };
+        Ok(Self { shape: Shape::Volume(volume) })
+    }
+
+    /// Whether the blade takes out what lies within it.
+    pub fn is_volume(&self) -> bool {
+        matches!(self.shape, Shape::Volume(_))
+    }
+
+    /// The same blade in the space of an organ, whose transform leads from there to the blade's space.
+    ///
+    /// Mirrors, non-uniform scale and shear are fine. Corners are mapped in f64 and rounded to f32, each by itself, so
+    /// triangles that share one still do.
+    ///
+    /// # Errors
+    /// A transform without inverse; corners so far away in the organ's space that they are not finite there.
+    pub fn to_local(&self, local_to_world: &Affine3A) -> Result<Self, BladeError> {
+        let frame = Frame::new(local_to_world)?;
+        let shape = match &self.shape {
+            Shape::Triangles(triangles) => {
+                let local = |corner: Vec3| frame.outward.transform_point3(corner.as_dvec3()).as_vec3();
+                let triangles: Vec<_> = triangles.iter().map(|corners| corners.map(local)).collect();
+                for &corner in triangles.as_flattened() {
+                    finite_point("a corner in the organ's space", corner)?;
+                }
+                Shape::Triangles(triangles)
+            }
+            Shape::Disc(disc) => Shape::Disc(Disc { frame: disc.frame.after(&frame), ..*disc }),
+            Shape::Volume(volume) => Shape::Volume(Volume { frame: volume.frame.after(&frame), ..*volume }),
+        };
+        Ok(Self { shape })
+    }
+
+    /// Calls `visit(box, part)` for parts that make up the blade.
+    ///
+    /// Triangles come in pairs, so that what asks an index for each part asks once for a swept edge.
+    pub(super) fn parts(&self, mut visit: impl FnMut([Vec3; 2], Part)) {
+        match &self.shape {
+            Shape::Triangles(triangles) => {
+                for pair in triangles.chunks(2) {
+                    let corners = pair.as_flattened();
+                    let min = corners.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+                    let max = corners.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+                    visit([min, max], Part::Triangles(pair));
+                }
+            }
+            Shape::Disc(disc) => visit(disc.bounds(), Part::Disc(disc)),
+            Shape::Volume(volume) => visit(volume.bounds(), Part::Volume(volume)),
+        }
+    }
+}
+
+/// What one question to an index serves.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Part<'a> {
+    Triangles(&'a [[Vec3; 3]]),
+    Disc(&'a Disc),
+    Volume(&'a Volume),
+}
+
+impl Frame {
+    const IDENTITY: Self = Self { inward: DAffine3::IDENTITY, outward: DAffine3::IDENTITY };
+
+    /// The frame of a shape that is given in the space to which a transform leads.
+    fn new(local_to_world: &Affine3A) -> Result<Self, BladeError> {
+        let axes = &local_to_world.matrix3;
+        let matrix3 = DMat3::from_cols(axes.x_axis.as_dvec3(), axes.y_axis.as_dvec3(), axes.z_axis.as_dvec3());
+        let inward = DAffine3 { matrix3, translation: local_to_world.translation.as_dvec3() };
+        let determinant = matrix3.determinant();
+        let outward = if determinant == 0.0 { DAffine3::ZERO } else { inward.inverse() };
+        if determinant == 0.0 || !(inward.is_finite() && outward.is_finite()) {
+            return Err(BladeError::Singular { determinant });
+        }
+        Ok(Self { inward, outward })
+    }
+
+    /// This frame, seen from one space further out.
+    fn after(&self, next: &Self) -> Self {
+        Self { inward: self.inward * next.inward, outward: next.outward * self.outward }
+    }
+
+    /// The box, in the present space, around a ball of the shape's space. `flat`: the normal of a disc instead.
+    fn bounds(&self, center: DVec3, radius: f64, flat: DVec3) -> [DVec3; 2] {
+        let rows = self.outward.matrix3.transpose();
+        let reach = |row: DVec3| {
+            let along = row.dot(flat);
+            radius * (row.length_squared() - along * along).max(0.0).sqrt()
+        };
+        let half = DVec3::new(reach(rows.x_axis), reach(rows.y_axis), reach(rows.z_axis));
+        let center = self.outward.transform_point3(center);
+        // More than the rounding of what led here.
+        let half = half + ROUNDING * (half + center.abs() + self.outward.translation.abs());
+        [center - half, center + half]
+    }
+}
+
+/// Share by which boxes around curved shapes are widened against rounding in f64.
+const ROUNDING: f64 = 1e-12;
+
+impl Disc {
+    fn bounds(&self) -> [Vec3; 2] {
+        outwards(self.frame.bounds(self.center, self.radius, self.normal))
+    }
+}
+
+impl Volume {
+    fn bounds(&self) -> [Vec3; 2] {
+        let [a, b] = self.frame.bounds(self.from, self.radius, DVec3::ZERO);
+        let [c, d] = self.frame.bounds(self.to, self.radius, DVec3::ZERO);
+        outwards([a.min(c), b.max(d)])
+    }
+}
+
+/// A box rounded to f32 so that it becomes no smaller.
+fn outwards([min, max]: [DVec3; 2]) -> [Vec3; 2] {
+    [min.as_vec3().map(f32::next_down), max.as_vec3().map(f32::next_up)]
+}
+
+fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {
+    let a = a.as_dvec3();
+    (b.as_dvec3() - a).cross(c.as_dvec3() - a) != DVec3::ZERO
+}
+
+fn finite_point(what: &'static str, point: Vec3) -> Result<(), BladeError> {
+    match point.to_array().into_iter().find(|value| !value.is_finite()) {
+        Some(value) => Err(BladeError::NotFinite { what, value }),
+        None => Ok(()),
+    }
+}
+
+fn positive(what: &'static str, value: f32) -> Result<f64, BladeError> {
+    if !value.is_finite() {
+        return Err(BladeError::NotFinite { what, value });
+    }
+    if value > 0.0 { Ok(f64::from(value)) } else { Err(BladeError::NotPositive { what, value }) }
+}

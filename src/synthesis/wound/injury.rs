@@ -1,0 +1,334 @@
+//! What has happened to one segment: gaps in it, and what holds it shut.
+//!
+//! Gaps lie in order along the segment and don't overlap; between them are its pieces, as many as gaps and one more,
+//! some of them without length. A clamp, tie or seal lies on a piece. One on the very tip of a piece belongs to that
+//! piece; where two tips touch, to the one towards the root.
+
+/// How much of the piece it belongs to an end draws back by at most. Below one half, so that a piece between two cuts
+/// never vanishes.
+pub(super) const MOST_RETRACTION: f32 = 0.45;
+
+/// A severed end, by its index in the ledger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tip {
+    pub end: u32,
+    /// Whether the lumen is closed for good.
+    pub sealed: bool,
+}
+
+/// A stretch of the segment where there is no vessel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Gap {
+    pub from: f32,
+    pub to: f32,
+    /// The end that the vessel has at `from`; `None` where what lay before it is gone with its parent's node.
+    pub proximal: Option<Tip>,
+    /// The end at `to`.
+    pub distal: Option<Tip>,
+}
+
+/// What closes the lumen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum ClosureKind {
+    /// A clamp, by its index in the ledger.
+    Clamp(u32),
+    Tie,
+    /// Coagulated by heat.
+    Seal,
+}
+
+/// A stretch of a piece that carries no blood; without length but for seals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Closure {
+    pub from: f32,
+    pub to: f32,
+    pub kind: ClosureKind,
+}
+
+/// Which end of a gap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub enum EndSide {
+    /// The end towards the root. Its lumen faces the tips.
+    Proximal,
+    /// The end towards the tips. Its lumen faces the root.
+    Distal,
+}
+
+/// An end as it lies on its segment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct End {
+    /// Its index in the ledger.
+    pub index: u32,
+    pub side: EndSide,
+    /// Share of the segment at which its tip is.
+    pub along: f32,
+    /// Whether it is not sealed, and nothing closes the piece that it ends.
+    pub is_open: bool,
+}
+
+/// All that has happened to a segment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Injury {
+    gaps: Vec<Gap>,
+    /// In the order of `from`.
+    closures: Vec<Closure>,
+}
+
+/// A stretch that a volume takes out, as [`Severed`](super::Severed).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Removal {
+    pub from: f32,
+    pub to: f32,
+    pub enters: bool,
+    pub leaves: bool,
+}
+
+impl Injury {
+    pub fn is_empty(&self) -> bool {
+        self.gaps.is_empty() && self.closures.is_empty()
+    }
+
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
+    }
+
+    pub fn closures(&self) -> &[Closure] {
+        &self.closures
+    }
+
+    /// The piece before gap `index`; behind the last for their number.
+    pub fn piece(&self, index: usize) -> [f32; 2] {
+        let from = index.checked_sub(1).map_or(0.0, |before| self.gaps[before].to);
+        [from, self.gaps.get(index).map_or(1.0, |gap| gap.from)]
+    }
+
+    /// All pieces, those without length too.
+    pub fn pieces(&self) -> impl Iterator<Item = [f32; 2]> + '_ {
+        (0..=self.gaps.len()).map(|index| self.piece(index))
+    }
+
+    /// Index of the piece that a closure belongs to.
+    fn piece_of(&self, closure: &Closure) -> usize {
+        let middle = 0.5 * (f64::from(closure.from) + f64::from(closure.to));
+        self.gaps.partition_point(|gap| middle > f64::from(gap.from))
+    }
+
+    /// What closes a piece.
+    fn closures_of(&self, piece: usize) -> impl Iterator<Item = &Closure> {
+        self.closures.iter().filter(move |closure| self.piece_of(closure) == piece)
+    }
+
+    /// Severs the segment at rising shares, where there is a vessel. Ends draw back by `retraction`, a share of the
+    /// segment, but not past what holds them. Returns at how many of the shares there was one.
+    pub fn cut(
+        &mut self,
+        shares: impl Iterator<Item = f32> + Clone,
+        retraction: f32,
+        mut new_end: impl FnMut() -> u32,
+    ) -> usize {
+        let shares = shares.filter(|&share| !self.gaps.iter().any(|gap| gap.from <= share && share <= gap.to));
+        let gaps: Vec<Gap> = shares
+            .clone()
+            .map(|share| {
+                // Another cut of the same blade limits an end as an older one does.
+                let below = shares.clone().filter(|&other| other < share).fold(self.hold_below(share), f32::max);
+                let above = shares.clone().filter(|&other| other > share).fold(self.hold_above(share), f32::min);
+                let (sealed_below, sealed_above) = (self.is_sealed_below(share), self.is_sealed_above(share));
+                Gap {
+                    from: share - retraction.min(MOST_RETRACTION * (share - below)),
+                    to: share + retraction.min(MOST_RETRACTION * (above - share)),
+                    proximal: Some(Tip { end: new_end(), sealed: sealed_below }),
+                    distal: Some(Tip { end: new_end(), sealed: sealed_above }),
+                }
+            })
+            .collect();
+        for gap in &gaps {
+            self.clear_closures(gap.from, gap.to);
+        }
+        self.gaps.extend_from_slice(&gaps);
+        self.gaps.sort_by(|a, b| a.from.total_cmp(&b.from));
+        gaps.len()
+    }
+
+    /// Takes a stretch out. Ends within it are gone; new ones are where it severs a vessel. Returns at how many places it
+    /// does, or `None` where it takes out nothing that was still there.
+    pub fn remove(&mut self, removal: Removal, retraction: f32, mut new_end: impl FnMut() -> u32) -> Option<usize> {
+        let Removal { from, to, enters, leaves } = removal;
+        let holds = |share: f32| self.gaps.iter().find(|gap| gap.from <= share && share <= gap.to);
+        let mut severs = 0;
+        let (start, proximal) = match holds(from) {
+            _ if !enters => (0.0, None),
+            Some(gap) => (gap.from, gap.proximal),
+            None => {
+                severs += 1;
+                let back = retraction.min(MOST_RETRACTION * (from - self.hold_below(from)));
+                let sealed = self.is_sealed_below(from);
+                (from - back, Some(Tip { end: new_end(), sealed }))
+            }
+        };
+        let (end, distal) = match holds(to) {
+            _ if !leaves => (1.0, None),
+            Some(gap) => (gap.to, gap.distal),
+            None => {
+                severs += 1;
+                let back = retraction.min(MOST_RETRACTION * (self.hold_above(to) - to));
+                let sealed = self.is_sealed_above(to);
+                (to + back, Some(Tip { end: new_end(), sealed }))
+            }
+        };
+        let gap = Gap { from: start, to: end, proximal, distal };
+        if self.gaps.contains(&gap) {
+            return None;
+        }
+        let is_gone = |closure: &Closure| {
+            closure.kind != ClosureKind::Seal && ((!enters && closure.from <= to) || (!leaves && closure.from >= from))
+        };
+        self.closures.retain(|closure| !is_gone(closure));
+        self.clear_closures(start, end);
+        self.gaps.retain(|other| other.to < start || other.from > end);
+        let at = self.gaps.partition_point(|other| other.from < start);
+        self.gaps.insert(at, gap);
+        Some(severs)
+    }
+
+    fn is_sealed_below(&self, share: f32) -> bool {
+        self.seals().any(|seal| seal.from < share && share <= seal.to)
+    }
+
+    fn is_sealed_above(&self, share: f32) -> bool {
+        self.seals().any(|seal| seal.from <= share && share < seal.to)
+    }
+
+    fn seals(&self) -> impl Iterator<Item = &Closure> {
+        self.closures.iter().filter(|closure| closure.kind == ClosureKind::Seal)
+    }
+
+    /// Where an end that draws back towards the root from `share` is held: by a gap, a clamp, a tie or the parent.
+    fn hold_below(&self, share: f32) -> f32 {
+        let clamped = self.closures.iter().filter(|closure| closure.kind != ClosureKind::Seal);
+        let holds = self.gaps.iter().map(|gap| gap.to).chain(clamped.map(|closure| closure.from));
+        holds.filter(|&hold| hold <= share).fold(0.0, f32::max)
+    }
+
+    /// Where an end that draws back towards the node is held. A clamp at `share` itself stays with the other end.
+    fn hold_above(&self, share: f32) -> f32 {
+        let clamped = self.closures.iter().filter(|closure| closure.kind != ClosureKind::Seal);
+        let holds = self.gaps.iter().map(|gap| gap.from).chain(clamped.map(|closure| closure.from));
+        holds.filter(|&hold| hold > share).fold(1.0, f32::min)
+    }
+
+    /// Takes away what closes a stretch that is there no longer. Seals that reach beyond it keep the rest.
+    fn clear_closures(&mut self, from: f32, to: f32) {
+        let mut rest = Vec::new();
+        self.closures.retain_mut(|closure| {
+            if closure.kind != ClosureKind::Seal {
+                return closure.from <= from || closure.from >= to;
+            }
+            let beyond = Closure { from: closure.from.max(to), ..*closure };
+            if beyond.from < beyond.to && closure.from < from {
+                rest.push(beyond);
+            }
+            if closure.from < from {
+                closure.to = closure.to.min(from);
+            } else {
+                *closure = beyond;
+            }
+            closure.from < closure.to
+        });
+        self.closures.append(&mut rest);
+        self.closures.sort_by(|a, b| a.from.total_cmp(&b.from));
+    }
+
+    /// Whether there is a vessel, tips included, at a share.
+    pub fn has_vessel(&self, along: f32) -> bool {
+        let [from, to] = self.piece(self.gaps.partition_point(|gap| along > gap.from));
+        from < to && from <= along && along <= to
+    }
+
+    /// Puts a clamp or a tie where there is a vessel.
+    pub fn close(&mut self, along: f32, kind: ClosureKind) {
+        let at = self.closures.partition_point(|other| other.from <= along);
+        self.closures.insert(at, Closure { from: along, to: along, kind });
+    }
+
+    /// The clamps that are on.
+    pub fn clamps(&self) -> impl Iterator<Item = u32> {
+        self.closures.iter().filter_map(|closure| match closure.kind {
+            ClosureKind::Clamp(clamp) => Some(clamp),
+            ClosureKind::Tie | ClosureKind::Seal => None,
+        })
+    }
+
+    /// Takes a clamp off; false where it is not on.
+    pub fn unclamp(&mut self, clamp: u32) -> bool {
+        let before = self.closures.len();
+        self.closures.retain(|closure| closure.kind != ClosureKind::Clamp(clamp));
+        self.closures.len() < before
+    }
+
+    /// Seals what there is of the vessel between two shares, and the ends there. Returns whether that changed anything.
+    pub fn seal(&mut self, from: f32, to: f32) -> bool {
+        let before = self.clone();
+        let is_within = |share: f32| from <= share && share <= to;
+        for gap in &mut self.gaps {
+            for (share, tip) in [(gap.from, &mut gap.proximal), (gap.to, &mut gap.distal)] {
+                if let Some(tip) = tip {
+                    tip.sealed |= is_within(share);
+                }
+            }
+        }
+        for index in 0..=self.gaps.len() {
+            let [start, end] = self.piece(index);
+            self.seal_within(from.max(start), to.min(end), index);
+        }
+        *self != before
+    }
+
+    /// Seals a stretch of one piece, as one with the seals that it meets.
+    fn seal_within(&mut self, mut from: f32, mut to: f32, piece: usize) {
+        if !(from < to) {
+            return;
+        }
+        let meets = |seal: &&Closure| seal.kind == ClosureKind::Seal && seal.from <= to && seal.to >= from;
+        let met: Vec<Closure> = self.closures_of(piece).filter(meets).copied().collect();
+        for seal in &met {
+            (from, to) = (from.min(seal.from), to.max(seal.to));
+        }
+        self.closures.retain(|closure| !met.contains(closure));
+        let at = self.closures.partition_point(|other| other.from <= from);
+        self.closures.insert(at, Closure { from, to, kind: ClosureKind::Seal });
+    }
+
+    /// Every end of the segment, from parent to node.
+    pub fn ends(&self) -> impl Iterator<Item = End> + '_ {
+        self.gaps.iter().enumerate().flat_map(move |(index, gap)| {
+            let end = move |tip: Tip, side, along, piece| {
+                let is_open = !tip.sealed && self.closures_of(piece).next().is_none();
+                End { index: tip.end, side, along, is_open }
+            };
+            let proximal = gap.proximal.map(|tip| end(tip, EndSide::Proximal, gap.from, index));
+            let distal = gap.distal.map(|tip| end(tip, EndSide::Distal, gap.to, index + 1));
+            proximal.into_iter().chain(distal)
+        })
+    }
+
+    /// Up to where blood comes from the parent, and whether an open end lies there.
+    pub fn reach_from_parent(&self) -> (f32, Option<u32>) {
+        match (self.closures_of(0).next(), self.gaps.first()) {
+            (Some(closure), _) => (closure.from, None),
+            (None, Some(gap)) => (gap.from, gap.proximal.filter(|tip| !tip.sealed).map(|tip| tip.end)),
+            (None, None) => (1.0, None),
+        }
+    }
+
+    /// From where on blood may come back from the node, and whether an open end lies there.
+    pub fn reach_from_node(&self) -> (f32, Option<u32>) {
+        let closed = self.closures_of(self.gaps.len()).map(|closure| closure.to).reduce(f32::max);
+        match (closed, self.gaps.last()) {
+            (Some(share), _) => (share, None),
+            (None, Some(gap)) => (gap.to, gap.distal.filter(|tip| !tip.sealed).map(|tip| tip.end)),
+            (None, None) => (0.0, None),
+        }
+    }
+}

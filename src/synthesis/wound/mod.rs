@@ -1,0 +1,62 @@
+//! Cuts, clamps, ties and seals on a vessel tree.
+//!
+//! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and an index over its segments. Out: a
+//! [`WoundReport`] for each action, with every end that it opened or closed; and at any time [`Wounds`], from which the
+//! flow learns how far blood comes ([`Blockage`]) and a renderer what is left to draw ([`write_stumps`]).
+//!
+//! The tree itself is never changed: wounds are laid over it, each at a share of a segment. So growth, which only
+//! appends, and deformation, which moves nodes, go on beneath them, and undo is exact.
+//!
+//! # Rules
+//!
+//! - A vessel is severed where its centre line crosses a blade: see [`severed`] for what counts and how exact it is.
+//! - A ball or capsule takes out all that lies within it, and severs what passes its boundary.
+//! - Severed ends draw back at once, by [`Retraction`], along their segment and not past its ends. Where no vessel is
+//!   left, a blade severs nothing and a clamp finds no hold.
+//! - An end is open while it is not sealed, and no clamp, tie or seal is on the piece of its segment that it ends.
+//! - What closes a vessel is a place without length; a cut through it leaves it on the end towards the root. A cut
+//!   through a sealed stretch opens nothing.
+//! - An action that changes nothing does not count: undo passes over it.
+//!
+//! # Example
+//!
+//! ```
+//! use bevy_math::Vec3;
+//! use bevy_vessels::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
+//! use bevy_vessels::synthesis::wound::{Blade, EndSide, Retraction, Wounds};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let tree = VesselTree::from_arrays(vec![Vec3::ZERO, 4.0 * Vec3::X], vec![NO_PARENT, 0], vec![0.1; 2])?;
+//! let every_segment = |_: Vec3, _: Vec3, visit: &mut dyn FnMut(NodeId)| visit(NodeId(1));
+//! let mut wounds = Wounds::new(Retraction { radii: 2.0, length: 0.0 })?;
+//!
+//! let scalpel = Blade::sweep([-Vec3::Y - Vec3::Z, -Vec3::Y + Vec3::Z], [Vec3::Y - Vec3::Z, Vec3::Y + Vec3::Z])?;
+//! let scalpel = scalpel.to_local(&bevy_math::Affine3A::from_translation(-Vec3::X))?;
+//! let report = wounds.cut(&scalpel, &tree, every_segment);
+//! let [proximal, distal] = report.opened[..] else { panic!("two ends") };
+//! assert_eq!((proximal.side, distal.side), (EndSide::Proximal, EndSide::Distal));
+//! // Cut at x = 1; each end drew back by two radii.
+//! assert!((proximal.position.x - 0.8).abs() < 1e-6 && (distal.position.x - 1.2).abs() < 1e-6);
+//! assert_eq!(wounds.undo(&tree).unwrap().closed, [proximal.id, distal.id]);
+//! # Ok(())
+//! # }
+//! ```
+
+mod blade;
+mod crossing;
+mod error;
+mod injury;
+mod orientation;
+mod report;
+mod retraction;
+mod stumps;
+mod wounds;
+
+pub use blade::{Blade, BladeError};
+pub use crossing::{Severed, severed};
+pub use error::WoundError;
+pub use injury::EndSide;
+pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
+pub use retraction::Retraction;
+pub use stumps::{Blockage, Piece, PieceKind, write_stumps, write_stumps_of};
+pub use wounds::Wounds;

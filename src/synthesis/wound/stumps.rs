@@ -1,0 +1,217 @@
+//! What injuries leave of their segments: to draw, to find, and for the flow.
+//!
+//! In: [`Wounds`] and their tree. Out: the pieces of vessel that are left of a segment, as shares of it or as
+//! [`SegmentInstance`]s; the place nearest to a point where there still is a vessel; and how far blood may come into an
+//! injured segment from both sides.
+
+use super::crossing::segment;
+use super::injury::{Gap, Injury};
+use super::{EndId, Wounds};
+use crate::synthesis::instances::{SegmentColors, SegmentInstance, segment_instance};
+use crate::synthesis::tree::{NodeId, Place, VesselTree};
+use bevy_math::Vec3;
+
+/// Which piece of a severed segment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PieceKind {
+    /// Hangs on the parent's node.
+    Proximal,
+    /// Between two cuts.
+    Floating,
+    /// Hangs on the segment's own node.
+    Distal,
+}
+
+/// A piece that is left of a severed segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    /// The node in which the segment ends.
+    pub node: NodeId,
+    /// Which piece.
+    pub kind: PieceKind,
+    /// Share of the segment, from the parent, at which it begins.
+    pub from: f32,
+    /// Share at which it ends; above `from`.
+    pub to: f32,
+}
+
+/// How far blood may come into an injured segment.
+///
+/// From the parent it reaches the share `first`, from the node the share `last`; what lies between carries nothing. A
+/// plain clamp has both at its place, and no end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blockage {
+    /// The node in which the segment ends.
+    pub node: NodeId,
+    /// Share at which what the parent feeds is closed or severed.
+    pub first: f32,
+    /// Share at which what the node feeds back is closed or severed. At least `first`.
+    pub last: f32,
+    /// The open end at `first`; `None` where the lumen is closed.
+    pub proximal: Option<EndId>,
+    /// The open end at `last`; `None` where the lumen is closed.
+    pub distal: Option<EndId>,
+}
+
+/// How far the round end that a segment is drawn with reaches beyond its end, in radii.
+const END_DOME: f32 = 1.0;
+/// The same beyond its start, where the dome is shallow.
+const START_DOME: f32 = 0.4;
+/// Most of a piece that the round ends of its cuts may take.
+const MOST_DOME: f32 = 0.9;
+
+impl Wounds {
+    /// Whether the segment of a node is severed, so that its pieces are drawn in its place.
+    pub fn is_severed(&self, node: NodeId) -> bool {
+        self.injury(node).is_some_and(|injury| !injury.gaps().is_empty())
+    }
+
+    /// The severed segments, in the order of their nodes.
+    pub fn severed_segments(&self) -> impl Iterator<Item = NodeId> + '_ {
+        self.injuries().filter(|(_, injury)| !injury.gaps().is_empty()).map(|(node, _)| node)
+    }
+
+    /// What is left of a severed segment, from parent to node; nothing of one that is whole, or wholly taken out.
+    pub fn pieces(&self, node: NodeId) -> impl Iterator<Item = Piece> + '_ {
+        self.injury(node).into_iter().flat_map(move |injury| {
+            let gaps = injury.gaps().len();
+            let kind = move |index: usize| match index {
+                0 => PieceKind::Proximal,
+                _ if index == gaps => PieceKind::Distal,
+                _ => PieceKind::Floating,
+            };
+            let pieces = injury.pieces().enumerate().filter(move |_| gaps > 0);
+            let pieces = pieces.map(move |(index, [from, to])| Piece { node, kind: kind(index), from, to });
+            pieces.filter(|piece| piece.from < piece.to)
+        })
+    }
+
+    /// How far blood may come into a segment; `None` for one to which nothing was done.
+    pub fn blockage(&self, node: NodeId) -> Option<Blockage> {
+        self.injury(node).map(|injury| self.blockage_of(node, injury))
+    }
+
+    /// How far blood may come into each injured segment, in the order of their nodes.
+    pub fn blockages(&self) -> impl Iterator<Item = Blockage> + '_ {
+        self.injuries().map(|(node, injury)| self.blockage_of(node, injury))
+    }
+
+    fn blockage_of(&self, node: NodeId, injury: &Injury) -> Blockage {
+        let (first, proximal) = injury.reach_from_parent();
+        let (last, distal) = injury.reach_from_node();
+        let id = |end: u32| self.end_id(end);
+        Blockage { node, first, last, proximal: proximal.map(id), distal: distal.map(id) }
+    }
+
+    /// The place where a vessel still is that is nearest to a point, and its distance: what was clicked, or what an
+    /// instrument touches.
+    ///
+    /// Distances are to the vessel's wall, negative within, so that a thick vessel that is touched is found before a thin
+    /// one behind it. Of equally near vessels the one of the lowest node counts. `None` where none is within `reach`, or
+    /// a number is not finite. Units: tissue lengths.
+    pub fn nearest_place(
+        &self,
+        tree: &VesselTree,
+        mut candidates: impl FnMut(Vec3, Vec3, &mut dyn FnMut(NodeId)),
+        point: Vec3,
+        reach: f32,
+    ) -> Option<(Place, f32)> {
+        let mut best: Option<(Place, f32)> = None;
+        if !(point.is_finite() && reach >= 0.0 && reach.is_finite()) {
+            return None;
+        }
+        candidates(point - reach, point + reach, &mut |node| {
+            let Some([parent, end]) = segment(tree, node) else { return };
+            let radius = tree.radii()[node.index()];
+            let mut try_piece = |[from, to]: [f32; 2]| {
+                let (along, distance) = nearest_on(parent, end, [from, to], point);
+                let distance = distance - radius;
+                let nearer = best.is_none_or(|(place, least)| {
+                    distance < least || (distance == least && (node, along) < (place.node, place.along))
+                });
+                if distance <= reach && nearer {
+                    best = Some((Place::new(node, along), distance));
+                }
+            };
+            match self.injury(node) {
+                None => try_piece([0.0, 1.0]),
+                Some(injury) => injury.pieces().filter(|[from, to]| from < to).for_each(try_piece),
+            }
+        });
+        best
+    }
+}
+
+/// Share and distance of the point nearest to `point` on a piece of a segment.
+fn nearest_on(start: Vec3, end: Vec3, [from, to]: [f32; 2], point: Vec3) -> (f32, f32) {
+    let (start, end, point) = (start.as_dvec3(), end.as_dvec3(), point.as_dvec3());
+    let along = end - start;
+    let share = (point - start).dot(along) / along.length_squared();
+    // Not a number where the segment has no length.
+    let share = if share.is_nan() { from } else { share.clamp(f64::from(from), f64::from(to)) as f32 };
+    (share, start.lerp(end, f64::from(share)).distance(point) as f32)
+}
+
+/// Appends to `out` what is left of the severed segments, as instances: in the order of their nodes, then from parent to
+/// node. Their own slots are to be hidden while [`Wounds::is_severed`].
+///
+/// `birth_steps` and `colors` as for [`write_segments`](crate::synthesis::instances::write_segments).
+pub fn write_stumps(
+    wounds: &Wounds,
+    tree: &VesselTree,
+    birth_steps: &[u32],
+    colors: &SegmentColors,
+    out: &mut Vec<SegmentInstance>,
+) {
+    for node in wounds.severed_segments() {
+        write_stumps_of(wounds, node, tree, birth_steps, colors, out);
+    }
+}
+
+/// Appends what is left of one segment; nothing if it is whole, wholly taken out, or not of the tree.
+///
+/// A piece is drawn with the taper that the whole segment has. The round end of a cut stays within the piece, so that
+/// gaps are as wide as the ledger has them; a piece too short for it ends more bluntly.
+pub fn write_stumps_of(
+    wounds: &Wounds,
+    node: NodeId,
+    tree: &VesselTree,
+    birth_steps: &[u32],
+    colors: &SegmentColors,
+    out: &mut Vec<SegmentInstance>,
+) {
+    let (Some(injury), Some(ends)) = (wounds.injury(node), segment(tree, node)) else { return };
+    let birth = birth_steps.get(node.index()).copied().unwrap_or(0);
+    let whole = segment_instance(tree, node.index(), birth, colors);
+    let length = ends[0].distance(ends[1]);
+    out.extend(wounds.pieces(node).map(|piece| {
+        let is_cut = |share: f32| injury.gaps().iter().any(|gap: &Gap| gap.from == share || gap.to == share);
+        draw(&whole, ends, length, piece, [is_cut(piece.from), is_cut(piece.to)])
+    }));
+}
+
+fn draw(
+    whole: &SegmentInstance,
+    [start, end]: [Vec3; 2],
+    length: f32,
+    piece: Piece,
+    cut: [bool; 2],
+) -> SegmentInstance {
+    let radius = |share: f32| whole.start_radius + (whole.end_radius - whole.start_radius) * share;
+    let room = MOST_DOME * length * (piece.to - piece.from);
+    let domes = [
+        if cut[0] { START_DOME * radius(piece.from) } else { 0.0 },
+        if cut[1] { END_DOME * radius(piece.to) } else { 0.0 },
+    ];
+    // How much of their size the round ends have room for.
+    let fit = (room / (domes[0] + domes[1]).max(f32::MIN_POSITIVE)).min(1.0);
+    let [back, ahead] = domes.map(|dome| fit * dome / length);
+    let size = |is_cut: bool, share: f32| radius(share) * if is_cut { fit } else { 1.0 };
+    SegmentInstance {
+        start: start.lerp(end, piece.from + back).to_array(),
+        start_radius: size(cut[0], piece.from),
+        end: start.lerp(end, piece.to - ahead).to_array(),
+        end_radius: size(cut[1], piece.to),
+        ..*whole
+    }
+}

@@ -1,0 +1,391 @@
+//! The ledger of what was done to one tree: cuts, clamps, ties and seals, with undo.
+
+use super::blade::Shape;
+use super::crossing::{Severed, segment, severed, within};
+use super::injury::{ClosureKind, End, EndSide, Injury, Removal};
+use super::{Blade, BladeError, ClampId, EndId, Retraction, SeveredEnd, WoundError, WoundReport};
+use crate::synthesis::tree::{NodeId, Place, VesselTree};
+use bevy_math::Vec3;
+use std::collections::BTreeMap;
+
+/// All that was done to one tree.
+///
+/// The tree itself stays as it is: it may grow and move beneath, and every place keeps its share of its segment. All
+/// calls take the tree that the wounds belong to; after another one took its place, [`clear`](Self::clear).
+///
+/// `candidates(min, max, visit)` is the index over the tree's segments: it calls `visit` with at least those that meet a
+/// box.
+#[derive(Clone, Debug, Default)]
+pub struct Wounds {
+    retraction: Retraction,
+    /// By node. None of them is empty.
+    injuries: BTreeMap<u32, Injury>,
+    ends: Vec<Record>,
+    clamps: Vec<Record>,
+    journal: Vec<Action>,
+    /// What the segments touched by the journal's actions were before, in order.
+    before: Vec<(u32, Injury)>,
+    generation: u32,
+    hits: Vec<Severed>,
+}
+
+/// An end or a clamp that was made, in the order of making.
+#[derive(Clone, Copy, Debug)]
+struct Record {
+    node: u32,
+    generation: u32,
+}
+
+/// How long the ledger's lists were before an action.
+#[derive(Clone, Copy, Debug)]
+struct Action {
+    ends: usize,
+    clamps: usize,
+    before: usize,
+}
+
+impl Wounds {
+    /// No wounds yet.
+    ///
+    /// # Errors
+    /// A retraction outside its limits.
+    pub fn new(retraction: Retraction) -> Result<Self, WoundError> {
+        retraction.validate()?;
+        Ok(Self { retraction, ..Self::default() })
+    }
+
+    /// How far ends draw back.
+    pub fn retraction(&self) -> Retraction {
+        self.retraction
+    }
+
+    /// Changes how far the ends of later cuts draw back.
+    ///
+    /// # Errors
+    /// A value outside its limits.
+    pub fn set_retraction(&mut self, retraction: Retraction) -> Result<(), WoundError> {
+        retraction.validate()?;
+        self.retraction = retraction;
+        Ok(())
+    }
+
+    /// Whether every segment is as it grew.
+    pub fn is_empty(&self) -> bool {
+        self.injuries.is_empty()
+    }
+
+    /// Number of the last action that changed anything. It only rises, through undo and clear too, so that whatever
+    /// carries it can be told from what came later.
+    pub fn generation(&self) -> u32 {
+        self.generation
+    }
+
+    /// Number of actions that can be undone.
+    pub fn actions(&self) -> usize {
+        self.journal.len()
+    }
+
+    /// Severs every vessel that the blade crosses; a ball or capsule also takes out what lies within it.
+    ///
+    /// The blade is in the tree's space: see [`Blade::to_local`]. What counts as crossed is said at
+    /// [`severed`]. Gaps are no vessel: what crosses one severs nothing there.
+    pub fn cut(
+        &mut self,
+        blade: &Blade,
+        tree: &VesselTree,
+        candidates: impl FnMut(Vec3, Vec3, &mut dyn FnMut(NodeId)),
+    ) -> WoundReport {
+        let mut hits = std::mem::take(&mut self.hits);
+        severed(blade, tree, candidates, &mut hits);
+        let action = self.begin();
+        let mut places = 0;
+        for of_segment in hits.chunk_by(|a, b| a.node == b.node) {
+            let node = of_segment[0].node;
+            let retraction = self.retraction_share(tree, node);
+            self.change(node.0, |injury, made| {
+                let severs = if blade.is_volume() {
+                    let Severed { from, to, enters, leaves, .. } = of_segment[0];
+                    injury.remove(Removal { from, to, enters, leaves }, retraction, || made.end())
+                } else {
+                    let severs = injury.cut(of_segment.iter().map(|hit| hit.from), retraction, || made.end());
+                    (severs > 0).then_some(severs)
+                };
+                places += severs.unwrap_or(0);
+                severs.is_some()
+            });
+        }
+        self.hits = hits;
+        WoundReport { severed: places, ..self.finish(action, tree) }
+    }
+
+    /// Puts a clamp on a vessel: no blood passes until it is taken off.
+    ///
+    /// # Errors
+    /// A place that is not on a vessel of the tree, or in a gap.
+    pub fn clamp(&mut self, place: Place, tree: &VesselTree) -> Result<(ClampId, WoundReport), WoundError> {
+        let clamp = ClampId { index: self.clamps.len() as u32, generation: self.generation + 1 };
+        let report = self.close(place, tree, |made| ClosureKind::Clamp(made.clamp()))?;
+        Ok((clamp, report))
+    }
+
+    /// Takes a clamp off.
+    ///
+    /// # Errors
+    /// When it is not on.
+    pub fn unclamp(&mut self, clamp: ClampId, tree: &VesselTree) -> Result<WoundReport, WoundError> {
+        let record = self.clamps.get(clamp.index as usize).filter(|record| record.generation == clamp.generation);
+        let &Record { node, .. } = record.ok_or(WoundError::NoSuchClamp { clamp })?;
+        let action = self.begin();
+        self.change(node, |injury, _| injury.unclamp(clamp.index));
+        let report = self.finish(action, tree);
+        if report.is_empty() { Err(WoundError::NoSuchClamp { clamp }) } else { Ok(report) }
+    }
+
+    /// Ties a vessel off: a clamp that only undo takes off again.
+    ///
+    /// # Errors
+    /// A place that is not on a vessel of the tree, or in a gap.
+    pub fn ligate(&mut self, place: Place, tree: &VesselTree) -> Result<WoundReport, WoundError> {
+        self.close(place, tree, |_| ClosureKind::Tie)
+    }
+
+    /// Seals by heat, within a ball or capsule, all vessels up to a calibre, for good: intact ones over the length that
+    /// lies within, and open ends that do. A cut through a sealed stretch opens nothing.
+    ///
+    /// `max_calibre` is the largest diameter that the instrument seals, in tissue lengths; infinity for any. Bipolar
+    /// instruments are rated to 7 mm.
+    ///
+    /// # Errors
+    /// A blade that is a surface, a calibre that is not above 0.
+    pub fn cauterise(
+        &mut self,
+        volume: &Blade,
+        max_calibre: f32,
+        tree: &VesselTree,
+        mut candidates: impl FnMut(Vec3, Vec3, &mut dyn FnMut(NodeId)),
+    ) -> Result<WoundReport, WoundError> {
+        let Shape::Volume(inside) = &volume.shape else { return Err(BladeError::NotAVolume.into()) };
+        if !(max_calibre > 0.0) {
+            return Err(WoundError::Calibre { calibre: max_calibre });
+        }
+        let mut nodes = Vec::new();
+        volume.parts(|[min, max], _| candidates(min, max, &mut |node| nodes.push(node.0)));
+        nodes.sort_unstable();
+        nodes.dedup();
+        let action = self.begin();
+        for node in nodes {
+            let Some([parent, end]) = segment(tree, NodeId(node)) else { continue };
+            let is_small = 2.0 * tree.radii()[node as usize] <= max_calibre;
+            if let Some(range) = within(inside, parent, end).filter(|_| is_small) {
+                self.change(node, |injury, _| injury.seal(range.from as f32, range.to as f32));
+            }
+        }
+        Ok(self.finish(action, tree))
+    }
+
+    /// Undoes the last action that changed anything; `None` where there is none.
+    pub fn undo(&mut self, tree: &VesselTree) -> Option<WoundReport> {
+        let action = self.journal.pop()?;
+        let mut report = WoundReport::default();
+        let touched = self.before.split_off(action.before);
+        for (node, before) in touched {
+            let now = self.injuries.remove(&node).unwrap_or_default();
+            self.compare(tree, node, &now, &before, &mut report);
+            if !before.is_empty() {
+                self.injuries.insert(node, before);
+            }
+        }
+        self.ends.truncate(action.ends);
+        self.clamps.truncate(action.clamps);
+        Some(report)
+    }
+
+    /// Undoes all actions, and reports what that changed in sum.
+    pub fn undo_all(&mut self, tree: &VesselTree) -> WoundReport {
+        let mut report = WoundReport::default();
+        for (&node, injury) in &self.injuries {
+            self.compare(tree, node, injury, &Injury::default(), &mut report);
+        }
+        self.clear();
+        report
+    }
+
+    /// Forgets everything, for another tree. The settings stay.
+    pub fn clear(&mut self) {
+        self.injuries.clear();
+        self.ends.clear();
+        self.clamps.clear();
+        self.journal.clear();
+        self.before.clear();
+    }
+
+    /// The severed end of an id, where it is now; `None` where it is gone.
+    pub fn end(&self, id: EndId, tree: &VesselTree) -> Option<SeveredEnd> {
+        let record = self.ends.get(id.index as usize).filter(|record| record.generation == id.generation)?;
+        let injury = self.injuries.get(&record.node)?;
+        let end = injury.ends().find(|end| end.index == id.index)?;
+        self.locate(tree, record.node, end)
+    }
+
+    /// All severed ends, open or not, where they are now: in the order of the nodes, then from parent to node.
+    pub fn ends<'a>(&'a self, tree: &'a VesselTree) -> impl Iterator<Item = SeveredEnd> + 'a {
+        let of_segment = move |(&node, injury): (&u32, &'a Injury)| {
+            injury.ends().filter_map(move |end| self.locate(tree, node, end))
+        };
+        self.injuries.iter().flat_map(of_segment)
+    }
+
+    /// Where a clamp sits; `None` where it is no longer on.
+    pub fn clamp_place(&self, clamp: ClampId) -> Option<Place> {
+        let record = self.clamps.get(clamp.index as usize).filter(|record| record.generation == clamp.generation)?;
+        let closures = self.injuries.get(&record.node)?.closures();
+        let found = closures.iter().find(|closure| closure.kind == ClosureKind::Clamp(clamp.index))?;
+        Some(Place::new(NodeId(record.node), found.from))
+    }
+
+    /// The segments that anything was done to, in the order of their nodes.
+    pub fn injured(&self) -> impl Iterator<Item = NodeId> + '_ {
+        self.injuries.keys().map(|&node| NodeId(node))
+    }
+
+    pub(super) fn injury(&self, node: NodeId) -> Option<&Injury> {
+        self.injuries.get(&node.0)
+    }
+
+    pub(super) fn injuries(&self) -> impl Iterator<Item = (NodeId, &Injury)> {
+        self.injuries.iter().map(|(&node, injury)| (NodeId(node), injury))
+    }
+
+    pub(super) fn end_id(&self, index: u32) -> EndId {
+        EndId { index, generation: self.ends[index as usize].generation }
+    }
+
+    fn close(
+        &mut self,
+        place: Place,
+        tree: &VesselTree,
+        kind: impl FnOnce(&mut Made) -> ClosureKind,
+    ) -> Result<WoundReport, WoundError> {
+        check(place, tree)?;
+        let action = self.begin();
+        self.change(place.node.0, |injury, made| {
+            injury.has_vessel(place.along) && {
+                injury.close(place.along, kind(made));
+                true
+            }
+        });
+        let report = self.finish(action, tree);
+        if report.is_empty() { Err(WoundError::NoVessel { place }) } else { Ok(report) }
+    }
+
+    fn begin(&self) -> Action {
+        Action { ends: self.ends.len(), clamps: self.clamps.len(), before: self.before.len() }
+    }
+
+    /// Changes one segment. `change` says whether it did; what it makes without doing so must be nothing.
+    fn change(&mut self, node: u32, change: impl FnOnce(&mut Injury, &mut Made) -> bool) {
+        let before = self.injuries.remove(&node).unwrap_or_default();
+        let mut injury = before.clone();
+        let record = Record { node, generation: self.generation + 1 };
+        let changed = change(&mut injury, &mut Made { record, ends: &mut self.ends, clamps: &mut self.clamps });
+        if !injury.is_empty() {
+            self.injuries.insert(node, injury);
+        }
+        if changed {
+            self.before.push((node, before));
+        }
+    }
+
+    /// Ends an action: it counts if it changed anything.
+    fn finish(&mut self, action: Action, tree: &VesselTree) -> WoundReport {
+        let mut report = WoundReport::default();
+        if self.before.len() == action.before {
+            return report;
+        }
+        self.generation += 1;
+        self.journal.push(action);
+        let none = Injury::default();
+        for (node, before) in &self.before[action.before..] {
+            let now = self.injuries.get(node).unwrap_or(&none);
+            self.compare(tree, *node, before, now, &mut report);
+        }
+        report
+    }
+
+    /// Adds to a report what became of one segment.
+    fn compare(&self, tree: &VesselTree, node: u32, before: &Injury, now: &Injury, report: &mut WoundReport) {
+        let [was_open, stays_open] = [before, now].map(|injury| {
+            let mut open: Vec<u32> = injury.ends().filter(|end| end.is_open).map(|end| end.index).collect();
+            open.sort_unstable();
+            open
+        });
+        let opened = now.ends().filter(|end| end.is_open && was_open.binary_search(&end.index).is_err());
+        report.opened.extend(opened.filter_map(|end| self.locate(tree, node, end)));
+        let closed = before.ends().filter(|end| end.is_open && stays_open.binary_search(&end.index).is_err());
+        report.closed.extend(closed.map(|end| self.end_id(end.index)));
+        let clamp_id = |index: u32| ClampId { index, generation: self.clamps[index as usize].generation };
+        let lacking = |here: &Injury, there: &Injury| -> Vec<ClampId> {
+            here.clamps().filter(|&clamp| there.clamps().all(|other| other != clamp)).map(clamp_id).collect()
+        };
+        report.clamped.extend(lacking(now, before));
+        report.unclamped.extend(lacking(before, now));
+        report.changed.push(NodeId(node));
+    }
+
+    /// A severed end as it lies in the tree; `None` where the tree has no such segment.
+    fn locate(&self, tree: &VesselTree, node: u32, end: End) -> Option<SeveredEnd> {
+        let place = Place::new(NodeId(node), end.along);
+        let [start, stop] = segment(tree, place.node)?;
+        // In f64, since a segment may be too short for the square of its length in f32.
+        let along = (stop.as_dvec3() - start.as_dvec3()).normalize_or_zero().as_vec3();
+        Some(SeveredEnd {
+            id: self.end_id(end.index),
+            place,
+            side: end.side,
+            is_open: end.is_open,
+            position: tree.position_at(place),
+            direction: if end.side == EndSide::Proximal { along } else { -along },
+            radius: tree.radii()[place.node.index()],
+        })
+    }
+
+    /// Retraction as a share of a segment.
+    fn retraction_share(&self, tree: &VesselTree, node: NodeId) -> f32 {
+        let length = tree.segment_vector(node.index()).length();
+        (self.retraction.radii * tree.radii()[node.index()] + self.retraction.length) / length
+    }
+}
+
+/// Gives out ends and clamps for one segment.
+struct Made<'a> {
+    record: Record,
+    ends: &'a mut Vec<Record>,
+    clamps: &'a mut Vec<Record>,
+}
+
+impl Made<'_> {
+    fn end(&mut self) -> u32 {
+        self.ends.push(self.record);
+        self.ends.len() as u32 - 1
+    }
+
+    fn clamp(&mut self) -> u32 {
+        self.clamps.push(self.record);
+        self.clamps.len() as u32 - 1
+    }
+}
+
+/// Passes a place on a segment of the tree.
+fn check(place: Place, tree: &VesselTree) -> Result<(), WoundError> {
+    let Place { node, along } = place;
+    if node.index() >= tree.len() {
+        return Err(WoundError::NoSuchNode { node: node.0, nodes: tree.len() });
+    }
+    if tree.parent(node).is_none() {
+        return Err(WoundError::OnRoot { node: node.0 });
+    }
+    if !(0.0..=1.0).contains(&along) {
+        return Err(WoundError::Along { node: node.0, along });
+    }
+    Ok(())
+}
