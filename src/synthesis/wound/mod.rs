@@ -43,9 +43,13 @@
 //! ```
 
 mod blade;
+pub mod bleeding;
+pub mod blood_volume;
+pub mod clotting;
 mod crossing;
 mod error;
 mod injury;
+pub mod ischaemia;
 mod orientation;
 mod report;
 mod retraction;
@@ -53,9 +57,13 @@ mod stumps;
 mod wounds;
 
 pub use blade::{Blade, BladeError};
+pub use bleeding::{Bleeding, BleedingChange, BleedingEnd, BleedingSettings, EndState};
+pub use blood_volume::{BloodVolume, BloodVolumeSettings};
+pub use clotting::Clotting;
 pub use crossing::{Severed, severed};
 pub use error::WoundError;
 pub use injury::EndSide;
+pub use ischaemia::{Supply, TissueSupply};
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
 pub use retraction::Retraction;
 pub use stumps::{Blockage, Piece, PieceKind, write_stumps, write_stumps_of};
