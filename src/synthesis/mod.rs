@@ -48,6 +48,7 @@
 //! ```
 
 mod attraction;
+pub mod binding;
 pub mod colonization;
 pub mod instances;
 pub mod io;

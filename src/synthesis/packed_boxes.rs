@@ -14,8 +14,8 @@ use bevy_math::Vec3;
 const LANES: usize = 8;
 /// Most levels: 8¹¹ exceeds 2³².
 const LEVELS: usize = 11;
-/// Room for the packs still to be visited: at most seven siblings stay behind on each level.
-const STACK: usize = LEVELS * LANES;
+/// Room for what is still to be visited: seven siblings stay behind on each level, and eight slots lie on the last.
+const STACK: usize = (LEVELS + 1) * LANES;
 /// Bits of a coordinate in the key of [`curve_order`].
 const KEY_BITS: u32 = 21;
 
@@ -244,38 +244,38 @@ impl PackedBoxes {
         mut visit: impl FnMut(usize, f32) -> f32,
     ) -> f32 {
         let mut best = limit;
-        let Some(top) = self.levels().checked_sub(1) else { return best };
+        // What is still to be visited: its bound, the number of levels below it, and its number on its level. A slot has
+        // none below it.
         let mut stack = [(0f32, 0u8, 0u32); STACK];
-        stack[0] = (f32::NEG_INFINITY, top as u8, 0);
-        let mut depth = 1;
-        while depth > 0 {
-            depth -= 1;
-            let (bound, level, index) = stack[depth];
-            if bound > best {
-                continue;
-            }
-            let bounds = bounds(&self.packs[(self.starts[level as usize] + index) as usize]);
-            let used = self.used(level as usize, index);
-            let (base, first) = (index * LANES as u32, depth);
-            for (lane, &bound) in bounds.iter().enumerate() {
-                // Written so that NaN fails it too.
-                if used & (1 << lane) == 0 || !(bound <= best) {
-                    continue;
-                }
-                let item = base + lane as u32;
-                if level == 0 {
+        let mut depth = 0;
+        let mut next = (self.levels() > 0).then_some((f32::NEG_INFINITY, self.levels() as u8, 0));
+        while let Some((bound, height, item)) = next {
+            if bound <= best {
+                if let Some(level) = height.checked_sub(1) {
+                    let bounds = bounds(&self.packs[(self.starts[level as usize] + item) as usize]);
+                    let used = self.used(level as usize, item);
+                    let first = depth;
+                    for (lane, &bound) in bounds.iter().enumerate() {
+                        // What is NaN fails it too.
+                        if used & (1 << lane) != 0 && bound <= best {
+                            // Kept in order, so that the nearest is on top.
+                            let mut at = depth;
+                            while at > first && stack[at - 1].0 < bound {
+                                stack[at] = stack[at - 1];
+                                at -= 1;
+                            }
+                            stack[at] = (bound, level, item * LANES as u32 + lane as u32);
+                            depth += 1;
+                        }
+                    }
+                } else {
                     best = visit(item as usize, best);
-                    continue;
                 }
-                // Kept in order, so that the nearest is on top.
-                let mut at = depth;
-                while at > first && stack[at - 1].0 < bound {
-                    stack[at] = stack[at - 1];
-                    at -= 1;
-                }
-                stack[at] = (bound, level - 1, item);
-                depth += 1;
             }
+            next = depth.checked_sub(1).map(|top| {
+                depth = top;
+                stack[top]
+            });
         }
         best
     }
