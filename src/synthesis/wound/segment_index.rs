@@ -130,8 +130,7 @@ impl SegmentIndex {
     /// Measures the boxes of some segments anew.
     ///
     /// A node whose radius changed is to be named; of a node that moved, the node and its children. Roots and nodes that
-    /// are not indexed yet are skipped. Takes about a tenth of a microsecond a node: beyond a quarter of all nodes,
-    /// [`refit`](Self::refit) is quicker.
+    /// are not indexed yet are skipped. Takes time in proportion to the nodes named.
     ///
     /// # Panics
     /// When the tree has fewer nodes than are indexed.
