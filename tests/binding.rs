@@ -254,7 +254,8 @@ fn nodes_that_grew_later_are_bound_at_rest() {
     let [_, mesh] = organs();
     let points = points_near(&mesh, 0.02, 500, 3);
     let whole = chain(points.clone());
-    let vertices = moved(&mesh, |p| bend(p, size(&mesh)));
+    let radius = size(&mesh);
+    let vertices = moved(&mesh, |p| bend(p, radius));
     let mut at_once = vec![Vec3::ZERO; 500];
     Binding::to_surface(&whole, &mesh).follow_into(&vertices, &mut at_once).unwrap();
     let mut binding = Binding::to_surface(&chain(points[..100].to_vec()), &mesh);
@@ -276,7 +277,8 @@ fn the_place_of_a_cut_stays_on_its_vessel() {
     let mut binding = Binding::to_surface(&rest, &colon);
     let cut = Place::new(NodeId(120), 0.3);
     let mut tree = rest.clone();
-    binding.follow(&moved(&colon, |p| bend(p, size(&colon))), &mut tree).unwrap();
+    let radius = size(&colon);
+    binding.follow(&moved(&colon, |p| bend(p, radius)), &mut tree).unwrap();
     let (start, end) = (tree.positions()[119], tree.positions()[120]);
     assert_ne!(tree.position_at(cut), rest.position_at(cut));
     assert!(tree.position_at(cut).distance(start + 0.3 * (end - start)) < 1e-6);
