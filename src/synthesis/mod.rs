@@ -7,6 +7,7 @@
 //! 2. [`roots`] say where vessels enter it.
 //! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`].
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
+//! 5. [`binding`] moves the vessels with an organ that deforms; [`wound`] finds the segments that a blade meets.
 //!
 //! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`rng`] hands out
 //! random streams, [`point_grid`] finds points by distance.
@@ -48,12 +49,14 @@
 //! ```
 
 mod attraction;
+pub mod binding;
 pub mod colonization;
 pub mod instances;
 pub mod io;
 pub mod mesh;
 pub mod murray;
 pub mod organ;
+mod packed_boxes;
 pub mod point_grid;
 pub mod preset;
 pub mod rng;
