@@ -55,7 +55,8 @@ const UNPORTABLE_MATHS: &[&str] = &[
 ];
 
 /// Where a tree may be changed. Every other room takes `&VesselTree`.
-const TREE_CHANGERS: &[&str] = &["src/synthesis/tree/", "src/synthesis/colonization/", "src/synthesis/murray.rs"];
+const TREE_CHANGERS: &[&str] =
+    &["src/synthesis/tree/", "src/synthesis/colonization/", "src/synthesis/murray.rs", "src/synthesis/binding/"];
 
 const MOST_LINES: usize = 600;
 

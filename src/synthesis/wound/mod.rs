@@ -1,6 +1,6 @@
 //! Cuts, clamps, ties and seals on a vessel tree.
 //!
-//! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and an index over its segments. Out: a
+//! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and a [`SegmentIndex`]. Out: a
 //! [`WoundReport`] for each action, with every end that it opened or closed; and at any time [`Wounds`], from which the
 //! flow learns how far blood comes ([`Blockage`]) and a renderer what is left to draw ([`write_stumps`]).
 //!
@@ -53,6 +53,8 @@ pub mod ischaemia;
 mod orientation;
 mod report;
 mod retraction;
+mod round_cone;
+mod segment_index;
 mod stumps;
 mod wounds;
 
@@ -66,5 +68,6 @@ pub use injury::EndSide;
 pub use ischaemia::{Supply, TissueSupply};
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
 pub use retraction::Retraction;
+pub use segment_index::SegmentIndex;
 pub use stumps::{Blockage, Piece, PieceKind, write_stumps, write_stumps_of};
 pub use wounds::Wounds;

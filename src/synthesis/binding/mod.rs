@@ -1,0 +1,194 @@
+//! Vessels bound to a deforming organ: nodes follow its surface, or the tetrahedra of its volume.
+//!
+//! In: a [`VesselTree`] and the organ at rest, a [`TriangleMesh`] or a [`TetMesh`]; then, each frame, the positions that
+//! a soft body gives the organ's vertices. Out: positions of the nodes.
+//!
+//! On a surface a node is bound to the nearest triangle: by the weights of its corners, and by the node's offset in a
+//! frame of the triangle's longest edge and the interpolated normal. So a node on the surface stays on it however that
+//! is stretched, and one above or below it keeps its distance. In tetrahedra a node is bound by its weights for the four
+//! corners of the one that holds it, so that it follows any affine motion exactly; a node outside all of them follows
+//! the nearest, extrapolated.
+//!
+//! Radii stay as they are: how a vessel narrows when it is stretched depends on its pressure, which is not known here.
+//! Nothing is known of cuts either. A [`Place`](crate::synthesis::tree::Place) on a segment moves with the segment's
+//! ends, so what was cut stays cut at the same spot of the vessel.
+
+mod surface;
+mod tetrahedra;
+
+pub use tetrahedra::{TetMesh, TetMeshError};
+
+use crate::synthesis::{mesh::TriangleMesh, tree::VesselTree};
+use bevy_math::Vec3;
+use surface::SurfaceBonds;
+use tetrahedra::SolidBonds;
+
+/// Fewest nodes worth handing to another thread.
+#[cfg(feature = "parallel")]
+const WORTH_SHARING: usize = 4096;
+
+/// Why nodes could not follow. Nothing has been moved then.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BindingError {
+    /// Another number of vertices than the organ has.
+    #[error(
+        "{given} vertex positions for an organ of {bound} vertices; give one for each vertex of the mesh that was bound to"
+    )]
+    VertexCount {
+        /// Vertices of the organ that was bound to.
+        bound: usize,
+        /// Positions given.
+        given: usize,
+    },
+    /// Another number of nodes than are bound.
+    #[error("{given} nodes to move, but {bound} are bound; call extend with the tree at rest after it grew")]
+    NodeCount {
+        /// Nodes bound.
+        bound: usize,
+        /// Nodes given.
+        given: usize,
+    },
+    /// A vertex that is infinite or not a number.
+    #[error(
+        "vertex {vertex} moved to {position}; every coordinate must be finite: the soft body may have become unstable"
+    )]
+    Vertex {
+        /// The first such vertex.
+        vertex: usize,
+        /// Where it is said to be.
+        position: Vec3,
+    },
+}
+
+/// The nodes of one tree, bound to one organ.
+///
+/// It keeps the organ at rest, so that nodes which grow later can be bound: growth goes on at rest, and what follows is
+/// a copy of the positions. Memory: 32 bytes a node, and about 150 bytes a triangle or tetrahedron.
+#[derive(Clone, Debug)]
+pub struct Binding {
+    bonds: Bonds,
+}
+
+#[derive(Clone, Debug)]
+enum Bonds {
+    Surface(SurfaceBonds),
+    Solid(SolidBonds),
+}
+
+impl Binding {
+    /// Binds every node of a tree to the nearest triangle of a mesh, both at rest.
+    ///
+    /// Of equally near triangles the first counts; degenerate ones are left out. Vertices at the same position count as
+    /// one for normals, so that seams don't show.
+    pub fn to_surface(tree: &VesselTree, mesh: &TriangleMesh) -> Self {
+        let mut binding = Self { bonds: Bonds::Surface(SurfaceBonds::new(mesh)) };
+        binding.extend(tree);
+        binding
+    }
+
+    /// Binds every node of a tree to the tetrahedron that holds it, or else to the nearest, both at rest.
+    ///
+    /// Of several that hold it, on a common face, the first counts; degenerate ones are left out. A node outside is
+    /// extrapolated: its weights leave the range from 0 to 1, and the farther outside it is, the more a tetrahedron's
+    /// motion moves it.
+    pub fn to_tetrahedra(tree: &VesselTree, mesh: &TetMesh) -> Self {
+        let mut binding = Self { bonds: Bonds::Solid(SolidBonds::new(mesh)) };
+        binding.extend(tree);
+        binding
+    }
+
+    /// Binds the nodes that were appended to the tree since the last call. The tree is to be at rest, as its beginning
+    /// was. A tree with fewer nodes than are bound is taken for another one, and bound from the beginning.
+    pub fn extend(&mut self, tree: &VesselTree) {
+        let bound = if tree.len() < self.len() { 0 } else { self.len() };
+        match &mut self.bonds {
+            Bonds::Surface(bonds) => bonds.bind(bound, tree.positions()),
+            Bonds::Solid(bonds) => bonds.bind(bound, tree.positions()),
+        }
+    }
+
+    /// Number of nodes bound.
+    pub fn len(&self) -> usize {
+        match &self.bonds {
+            Bonds::Surface(bonds) => bonds.len(),
+            Bonds::Solid(bonds) => bonds.len(),
+        }
+    }
+
+    /// Whether no node is bound.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of vertices of the organ.
+    pub fn vertices(&self) -> usize {
+        match &self.bonds {
+            Bonds::Surface(bonds) => bonds.vertices(),
+            Bonds::Solid(bonds) => bonds.vertices(),
+        }
+    }
+
+    /// Moves the nodes with the organ, whose vertices are now at `vertices`; `positions` has one entry per node.
+    ///
+    /// Where a triangle has collapsed, its nodes lie on it and lose their offset. With the feature `parallel` many nodes
+    /// are shared among the threads of the pool, with the same result.
+    ///
+    /// # Errors
+    /// Another number of vertices or nodes than were bound, or a vertex that is not finite.
+    pub fn follow_into(&mut self, vertices: &[Vec3], positions: &mut [Vec3]) -> Result<(), BindingError> {
+        if vertices.len() != self.vertices() {
+            return Err(BindingError::VertexCount { bound: self.vertices(), given: vertices.len() });
+        }
+        if positions.len() != self.len() {
+            return Err(BindingError::NodeCount { bound: self.len(), given: positions.len() });
+        }
+        if let Some(vertex) = vertices.iter().position(|position| !position.is_finite()) {
+            return Err(BindingError::Vertex { vertex, position: vertices[vertex] });
+        }
+        match &mut self.bonds {
+            Bonds::Surface(bonds) => bonds.follow(vertices, positions),
+            Bonds::Solid(bonds) => bonds.follow(vertices, positions),
+        }
+        Ok(())
+    }
+
+    /// Moves the nodes of a tree with the organ: [`follow_into`](Self::follow_into) its positions.
+    ///
+    /// The tree is to be a copy of the one at rest, where that still grows.
+    ///
+    /// # Errors
+    /// Those of [`follow_into`](Self::follow_into).
+    pub fn follow(&mut self, vertices: &[Vec3], tree: &mut VesselTree) -> Result<(), BindingError> {
+        self.follow_into(vertices, tree.positions_mut())
+    }
+
+    /// The organ's normal at a node, as the organ was in the last call of a `follow`, or at rest before the first.
+    ///
+    /// Unit length; `Vec3::ZERO` where the organ has collapsed, and for a node bound to tetrahedra.
+    ///
+    /// # Panics
+    /// When the node is not bound.
+    pub fn normal(&self, node: usize) -> Vec3 {
+        match &self.bonds {
+            Bonds::Surface(bonds) => bonds.normal(node),
+            Bonds::Solid(_) => Vec3::ZERO,
+        }
+    }
+}
+
+/// Fills `outputs` with `map` of each input, on all threads where that pays.
+fn map_all<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], map: impl Fn(&I) -> O + Sync) {
+    let fill = |outputs: &mut [O], inputs: &[I]| {
+        for (output, input) in outputs.iter_mut().zip(inputs) {
+            *output = map(input);
+        }
+    };
+    #[cfg(feature = "parallel")]
+    if inputs.len() >= 2 * WORTH_SHARING && rayon::current_num_threads() > 1 {
+        use rayon::prelude::*;
+        let shares = outputs.par_chunks_mut(WORTH_SHARING).zip(inputs.par_chunks(WORTH_SHARING));
+        shares.for_each(|(outputs, inputs)| fill(outputs, inputs));
+        return;
+    }
+    fill(outputs, inputs);
+}

@@ -1,0 +1,212 @@
+//! Nodes bound to tetrahedra, and the mesh of those.
+
+use super::map_all;
+use crate::synthesis::{
+    mesh::{MAX_COORDINATE, MAX_TRIANGLES},
+    tissue::{
+        bvh::{Bounds, BoxTree},
+        triangle::closest_on_triangle,
+    },
+};
+use bevy_math::{DMat3, DVec3, Vec3};
+
+/// Volume of a tetrahedron, relative to the cube of its longest edge from the first corner, below which it counts as
+/// degenerate.
+const DEGENERATE_SHAPE: f64 = 1.0e-9;
+
+/// Why a mesh of tetrahedra cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TetMeshError {
+    /// More vertices or tetrahedra than [`MAX_TRIANGLES`].
+    #[error("the mesh has {count} {what}, more than {MAX_TRIANGLES}; use a coarser one")]
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+    },
+    /// A vertex with a NaN or infinite coordinate, or one beyond [`MAX_COORDINATE`].
+    #[error(
+        "vertex {vertex} is at {position}; coordinates must be finite and within ±{MAX_COORDINATE}: repair or rescale the mesh"
+    )]
+    BadPosition {
+        /// The first such vertex.
+        vertex: usize,
+        /// Where it is.
+        position: Vec3,
+    },
+    /// A tetrahedron with a vertex that does not exist.
+    #[error(
+        "tetrahedron {tetrahedron} refers to vertex {index}, but there are {vertices} vertices; the index buffer is damaged"
+    )]
+    IndexOutOfRange {
+        /// The first such tetrahedron.
+        tetrahedron: usize,
+        /// The index found.
+        index: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// No tetrahedron has a volume.
+    #[error(
+        "none of {tetrahedra} tetrahedra has a volume (their corners coincide or lie in a plane); nothing can be bound to them"
+    )]
+    NoVolume {
+        /// Number of tetrahedra.
+        tetrahedra: usize,
+    },
+}
+
+/// Tetrahedra that fill an organ, as a soft body has them, checked by [`new`](Self::new).
+#[derive(Clone, Debug, PartialEq)]
+pub struct TetMesh {
+    positions: Vec<Vec3>,
+    tetrahedra: Vec<[u32; 4]>,
+}
+
+impl TetMesh {
+    /// Checks and takes over a mesh. The corners of a tetrahedron may stand in any order; degenerate ones are kept, and
+    /// nothing is bound to them.
+    ///
+    /// # Errors
+    /// The first thing that makes the mesh useless: see [`TetMeshError`].
+    pub fn new(positions: Vec<Vec3>, tetrahedra: Vec<[u32; 4]>) -> Result<Self, TetMeshError> {
+        let vertices = positions.len();
+        for (what, count) in [("vertices", vertices), ("tetrahedra", tetrahedra.len())] {
+            if count > MAX_TRIANGLES {
+                return Err(TetMeshError::TooLarge { what, count });
+            }
+        }
+        // Written so that NaN fails it too.
+        let usable = |p: &Vec3| p.abs().max_element() <= MAX_COORDINATE && p.is_finite();
+        if let Some(vertex) = positions.iter().position(|p| !usable(p)) {
+            return Err(TetMeshError::BadPosition { vertex, position: positions[vertex] });
+        }
+        for (tetrahedron, corners) in tetrahedra.iter().enumerate() {
+            if let Some(&index) = corners.iter().find(|&&index| index as usize >= vertices) {
+                return Err(TetMeshError::IndexOutOfRange { tetrahedron, index, vertices });
+            }
+        }
+        let mesh = Self { positions, tetrahedra };
+        let count = mesh.tetrahedra.len();
+        if (0..count).all(|tetrahedron| mesh.is_degenerate(tetrahedron)) {
+            return Err(TetMeshError::NoVolume { tetrahedra: count });
+        }
+        Ok(mesh)
+    }
+
+    /// Position of every vertex, in tissue lengths.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The four vertices of every tetrahedron.
+    pub fn tetrahedra(&self) -> &[[u32; 4]] {
+        &self.tetrahedra
+    }
+
+    /// Whether a tetrahedron has no volume to speak of.
+    ///
+    /// # Panics
+    /// When there is no such tetrahedron.
+    pub fn is_degenerate(&self, tetrahedron: usize) -> bool {
+        let edges = edges(self.corners(tetrahedron));
+        let longest = edges.x_axis.length().max(edges.y_axis.length()).max(edges.z_axis.length());
+        // NaN and a longest edge of 0 fail it too.
+        let has_volume = edges.determinant().abs() > DEGENERATE_SHAPE * longest * longest * longest;
+        !has_volume
+    }
+
+    fn corners(&self, tetrahedron: usize) -> [Vec3; 4] {
+        self.tetrahedra[tetrahedron].map(|index| self.positions[index as usize])
+    }
+}
+
+/// From the first corner to the others.
+fn edges([a, b, c, d]: [Vec3; 4]) -> DMat3 {
+    let [a, b, c, d] = [a, b, c, d].map(|corner| corner.as_dvec3());
+    DMat3::from_cols(b - a, c - a, d - a)
+}
+
+/// A point's weights for the last three corners of a tetrahedron; the four sum to 1.
+fn weights(point: Vec3, corners: [Vec3; 4]) -> DVec3 {
+    edges(corners).inverse() * (point.as_dvec3() - corners[0].as_dvec3())
+}
+
+/// Squared distance of a point from a tetrahedron, 0 inside.
+fn distance_squared(point: Vec3, corners: [Vec3; 4]) -> f64 {
+    let weights = weights(point, corners);
+    if weights.min_element() >= 0.0 && weights.element_sum() <= 1.0 {
+        return 0.0;
+    }
+    let [a, b, c, d] = corners;
+    let to_face = |face| (closest_on_triangle(point, face).1 - point.as_dvec3()).length_squared();
+    [[a, b, c], [a, b, d], [a, c, d], [b, c, d]].map(to_face).into_iter().fold(f64::INFINITY, f64::min)
+}
+
+/// A node's place relative to a tetrahedron.
+#[derive(Clone, Copy, Debug)]
+struct Bond {
+    corners: [u32; 4],
+    /// Weights of the last three corners; the four sum to 1.
+    weights: Vec3,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct SolidBonds {
+    mesh: TetMesh,
+    tree: BoxTree,
+    /// Number of each slot's tetrahedron.
+    tetrahedra: Vec<u32>,
+    bonds: Vec<Bond>,
+}
+
+impl SolidBonds {
+    pub fn new(mesh: &TetMesh) -> Self {
+        let numbers: Vec<u32> =
+            (0..mesh.tetrahedra.len() as u32).filter(|&number| !mesh.is_degenerate(number as usize)).collect();
+        let tree = BoxTree::new(numbers.iter().map(|&number| Bounds::around(&mesh.corners(number as usize))));
+        let tetrahedra = tree.order().iter().map(|&id| numbers[id as usize]).collect();
+        Self { mesh: mesh.clone(), tree, tetrahedra, bonds: Vec::new() }
+    }
+
+    pub fn len(&self) -> usize {
+        self.bonds.len()
+    }
+
+    pub fn vertices(&self) -> usize {
+        self.mesh.positions.len()
+    }
+
+    /// Binds the nodes from a number on.
+    pub fn bind(&mut self, from: usize, nodes: &[Vec3]) {
+        self.bonds.truncate(from);
+        for &node in &nodes[from..] {
+            let tetrahedron = self.nearest(node);
+            let weights = weights(node, self.mesh.corners(tetrahedron)).as_vec3();
+            self.bonds.push(Bond { corners: self.mesh.tetrahedra[tetrahedron], weights });
+        }
+    }
+
+    /// The first of the tetrahedra nearest to a point.
+    fn nearest(&self, point: Vec3) -> usize {
+        let mut found = (f64::INFINITY, u32::MAX);
+        self.tree.nearest(point, f32::INFINITY, |slot, best| {
+            let tetrahedron = self.tetrahedra[slot];
+            let offer = (distance_squared(point, self.mesh.corners(tetrahedron as usize)), tetrahedron);
+            if offer >= found {
+                return best;
+            }
+            found = offer;
+            offer.0 as f32
+        });
+        found.1 as usize
+    }
+
+    pub fn follow(&self, vertices: &[Vec3], positions: &mut [Vec3]) {
+        map_all(&self.bonds, positions, |bond| {
+            let [a, b, c, d] = bond.corners.map(|corner| vertices[corner as usize]);
+            a + (b - a) * bond.weights.x + (c - a) * bond.weights.y + (d - a) * bond.weights.z
+        });
+    }
+}

@@ -1,0 +1,126 @@
+//! A segment's shape: the round cone that it is drawn as, and questions to it.
+//!
+//! A round cone is all the balls whose centre goes from one end of the segment to the other while their radius goes
+//! from the one end's to the other's. Everything here is in f64, on the tree's f32.
+
+use crate::synthesis::{
+    instances::MAX_FLARE,
+    tree::{NO_PARENT, VesselTree},
+};
+use bevy_math::{DVec3, Vec3};
+
+/// The balls between two ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct RoundCone {
+    /// Centre at the root's side.
+    pub start: DVec3,
+    /// Centre at the node.
+    pub end: DVec3,
+    /// Radius at `start`.
+    pub start_radius: f64,
+    /// Radius at `end`.
+    pub end_radius: f64,
+}
+
+impl RoundCone {
+    /// The segment that ends in a node, as [`SegmentInstance`](crate::synthesis::instances::SegmentInstance) draws it;
+    /// `None` for a root.
+    pub fn of(tree: &VesselTree, node: u32) -> Option<Self> {
+        let node = node as usize;
+        let parent = tree.parents()[node];
+        if parent == NO_PARENT {
+            return None;
+        }
+        let radius = tree.radii()[node];
+        Some(Self {
+            start: tree.positions()[parent as usize].as_dvec3(),
+            end: tree.positions()[node].as_dvec3(),
+            start_radius: tree.radii()[parent as usize].min(MAX_FLARE * radius).into(),
+            end_radius: radius.into(),
+        })
+    }
+
+    /// Share of the way along the centre line at which it is nearest to a point, and the squared distance.
+    pub fn nearest(&self, point: DVec3) -> (f64, f64) {
+        let (along, to_point) = (self.end - self.start, point - self.start);
+        let (share, length_squared) = (along.dot(to_point), along.length_squared());
+        // The ends are taken as they are, so that segments that share one are equally far.
+        if share <= 0.0 || length_squared == 0.0 {
+            (0.0, to_point.length_squared())
+        } else if share >= length_squared {
+            (1.0, point.distance_squared(self.end))
+        } else {
+            let share = share / length_squared;
+            (share, (to_point - along * share).length_squared())
+        }
+    }
+
+    /// How far along a ray of unit direction its first point in the cone is, 0 from inside, and the share of the way
+    /// along the centre line of the ball that is hit there.
+    ///
+    /// A point q is inside where the least f(s) = |q − start − s·v|² − (r + s·k)² over 0 ≤ s ≤ 1 is at most 0, with v from
+    /// end to end and k the difference of radii. Between the ends the least is where f'(s) = 0, which leaves a quadratic
+    /// equation for the distance along the ray; at the ends it is a ball's.
+    pub fn hit(&self, from: DVec3, direction: DVec3) -> Option<(f64, f64)> {
+        let (v, k) = (self.end - self.start, self.end_radius - self.start_radius);
+        let to_from = from - self.start;
+        let h = v.length_squared() - k * k;
+        let ends = [(0.0, to_from, self.start_radius), (1.0, from - self.end, self.end_radius)];
+        if !(h > 0.0) {
+            // One ball holds all the others.
+            let (share, to_from, radius) = ends[usize::from(k >= 0.0)];
+            return hit_ball(to_from, direction, radius).map(|distance| (distance, share));
+        }
+        let (s0, s1) = ((v.dot(to_from) + k * self.start_radius) / h, v.dot(direction) / h);
+        let nearest = s0.clamp(0.0, 1.0);
+        let radius = self.start_radius + nearest * k;
+        if (to_from - v * nearest).length_squared() <= radius * radius {
+            return Some((0.0, nearest));
+        }
+        let a = 1.0 - s1 * s1 * h;
+        let b = to_from.dot(direction) - s0 * s1 * h;
+        let c = to_from.length_squared() - self.start_radius * self.start_radius - s0 * s0 * h;
+        let side = roots(a, b, c).map(|distance| (distance, s0 + s1 * distance));
+        let side = side.into_iter().filter(|(_, share)| (0.0..=1.0).contains(share));
+        let balls = ends.into_iter().filter_map(|(share, to_from, radius)| {
+            hit_ball(to_from, direction, radius).map(|distance| (distance, share))
+        });
+        side.chain(balls).filter(|(distance, _)| *distance >= 0.0).min_by(|x, y| x.0.total_cmp(&y.0))
+    }
+}
+
+/// How far along a ray of unit direction a ball begins, 0 from inside.
+fn hit_ball(to_from: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
+    let c = to_from.length_squared() - radius * radius;
+    if c <= 0.0 {
+        return Some(0.0);
+    }
+    let b = to_from.dot(direction);
+    // From outside the first of the two roots is the nearer one, and positive where the ray comes closer.
+    roots(1.0, b, c).into_iter().filter(|distance| *distance >= 0.0).min_by(f64::total_cmp)
+}
+
+/// The solutions of a·t² + 2·b·t + c = 0; NaN or infinite where there is none, or only one.
+fn roots(a: f64, b: f64, c: f64) -> [f64; 2] {
+    // The sum whose terms have one sign, so that none of the two solutions is a difference of nearly equal numbers.
+    let sum = -(b + (b * b - a * c).sqrt().copysign(b));
+    [sum / a, c / sum]
+}
+
+/// The box around a segment, as wide as any parent's radius can make it; `None` for a root.
+///
+/// It depends on the node's own radius and on both ends' positions, so that a radius that changes touches one box.
+pub(super) fn box_around(tree: &VesselTree, node: u32) -> Option<(Vec3, Vec3)> {
+    let node = node as usize;
+    let parent = tree.parents()[node];
+    if parent == NO_PARENT {
+        return None;
+    }
+    let (start, end) = (tree.positions()[parent as usize], tree.positions()[node]);
+    let radius = tree.radii()[node];
+    let wide = MAX_FLARE * radius;
+    // Rounded outwards, so that the box holds every point of the segment.
+    let min = (start - wide).min(end - radius);
+    let max = (start + wide).max(end + radius);
+    Some((min.to_array().map(f32::next_down).into(), max.to_array().map(f32::next_up).into()))
+}

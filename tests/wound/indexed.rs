@@ -1,0 +1,68 @@
+//! The ledger through the index, while the tree grows and moves, against the ledger through all segments.
+
+use crate::common::{all, forest, random_point, rng};
+use bevy_math::Vec3;
+use bevy_vessels::synthesis::rng::VesselRng;
+use bevy_vessels::synthesis::tree::{NodeId, VesselTree};
+use bevy_vessels::synthesis::wound::{Blade, SegmentIndex, Wounds};
+use rand::RngExt;
+
+fn by(index: &SegmentIndex) -> impl Fn(Vec3, Vec3, &mut dyn FnMut(NodeId)) + Copy {
+    move |min, max, visit| index.candidates(min, max, visit)
+}
+
+fn random_blade(rng: &mut VesselRng) -> Blade {
+    let mut point = || random_point(rng);
+    let [a, b, c, d] = [point(), point(), point(), point()];
+    let radius = 0.2 * a.distance(c);
+    let blade = match rng.random_range(0..5) {
+        0 => Blade::sweep([a, b], [c, d]),
+        1 => Blade::disc(a, b - a, radius),
+        2 => Blade::triangles(vec![[a, b, c], [b, c, d], [c, d, a]]),
+        3 => Blade::ball(a, radius),
+        _ => Blade::capsule(a, b, 0.3 * radius),
+    };
+    blade.expect("a blade")
+}
+
+/// The first nodes of a tree, where they are after the whole was stirred.
+fn part(whole: &VesselTree, nodes: usize, stir: Vec3) -> VesselTree {
+    let moved = |at: &Vec3| *at + stir * at.length_squared();
+    let positions = whole.positions()[..nodes].iter().map(moved).collect();
+    VesselTree::from_arrays(positions, whole.parents()[..nodes].to_vec(), whole.radii()[..nodes].to_vec())
+        .expect("the beginning of a tree")
+}
+
+#[test]
+fn the_index_changes_nothing() {
+    let mut rng = rng(61);
+    let whole = forest(7, 3_000);
+    let (mut index, mut stir, mut nodes) = (SegmentIndex::default(), Vec3::ZERO, 10);
+    let [mut fast, mut slow] = [Wounds::default(), Wounds::default()];
+    let mut tree = part(&whole, nodes, stir);
+    index.extend(&tree);
+    let mut severed = 0;
+    for step in 0..600 {
+        if step % 10 == 0 {
+            stir += 0.05 * random_point(&mut rng);
+            tree = part(&whole, nodes, stir);
+            index.refit(&tree);
+        }
+        nodes = (nodes + 5).min(whole.len());
+        tree = part(&whole, nodes, stir);
+        index.extend(&tree);
+        let blade = random_blade(&mut rng);
+        let expected = slow.cut(&blade, &tree, all(&tree));
+        assert_eq!(fast.cut(&blade, &tree, by(&index)), expected, "step {step}");
+        severed += expected.severed;
+        if step % 7 == 0 && blade.is_volume() {
+            let expected = slow.cauterise(&blade, 0.03, &tree, all(&tree)).expect("a volume");
+            assert_eq!(fast.cauterise(&blade, 0.03, &tree, by(&index)), Ok(expected), "step {step}");
+        }
+        let (point, reach) = (random_point(&mut rng), rng.random_range(0.0..0.3));
+        let expected = slow.nearest_place(&tree, all(&tree), point, reach);
+        assert_eq!(fast.nearest_place(&tree, by(&index), point, reach), expected, "step {step}");
+    }
+    assert!(severed > 5_000, "only {severed} severed");
+    assert_eq!(fast.undo_all(&tree), slow.undo_all(&tree));
+}
