@@ -26,7 +26,7 @@ pub struct Preset {
     pub tissue: TissueSettings,
     /// Where arteries begin.
     ///
-    /// Default: one root, chosen by the seed.
+    /// Default: one root, chosen by the seed; in a long organ several.
     pub arterial_roots: RootPlacement,
     /// Where veins begin.
     ///
@@ -42,7 +42,7 @@ impl Default for Preset {
             source: String::new(),
             fit: true,
             tissue: TissueSettings::default(),
-            arterial_roots: RootPlacement::Spread(1),
+            arterial_roots: RootPlacement::Within(Roots::DEFAULT_REACH),
             venous_roots: RootPlacement::Beside,
             settings: ColonizationSettings::default(),
         }

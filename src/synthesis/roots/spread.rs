@@ -1,0 +1,91 @@
+//! Roots that the seed chooses: far from each other, or beside those of the other system.
+
+use super::{RootError, Roots};
+use crate::synthesis::{
+    rng::VesselRng,
+    tissue::{Tissue, TissuePoint},
+    tree::System,
+};
+use bevy_math::Vec3;
+use rand::RngExt;
+
+/// Samples of the tissue among which roots are chosen, at least.
+pub(super) const SPREAD_SAMPLES: u32 = 1024;
+/// Samples per spread root, at least.
+const SAMPLES_PER_ROOT: u32 = 16;
+/// Draws per sample before a tissue counts as having no more.
+const DRAWS_PER_SAMPLE: u32 = 64;
+/// Directions tried for a root beside another.
+const DIRECTIONS: u32 = 16;
+
+/// Roots far from each other: of many samples, again and again the one furthest from those chosen (Gonzalez,
+/// "Clustering to minimize the maximum intercluster distance", 1985).
+pub(super) fn spread(
+    tissue: &dyn Tissue,
+    system: System,
+    count: u32,
+    rng: &mut VesselRng,
+) -> Result<Vec<TissuePoint>, RootError> {
+    if count > Roots::MAX_SPREAD {
+        return Err(RootError::TooMany { system, count, limit: Roots::MAX_SPREAD });
+    }
+    let samples = draw(tissue, SPREAD_SAMPLES.max(count * SAMPLES_PER_ROOT), rng);
+    let mut distances = vec![f32::INFINITY; samples.len()];
+    let mut chosen: Vec<TissuePoint> = Vec::with_capacity(count as usize);
+    // The first sample is as good as any; of equal distances the earliest counts.
+    let mut next = 0;
+    while chosen.len() < count as usize {
+        if distances.get(next).is_none_or(|&distance| distance == 0.0) {
+            return Err(RootError::NoRoom { system, wanted: count, found: chosen.len() as u32 });
+        }
+        let root = TissuePoint { position: samples[next], ..tissue.closest_point(samples[next]) };
+        chosen.push(root);
+        let mut furthest = 0.0;
+        for (index, (distance, sample)) in distances.iter_mut().zip(&samples).enumerate() {
+            *distance = distance.min(sample.distance_squared(root.position));
+            if *distance > furthest {
+                (next, furthest) = (index, *distance);
+            }
+        }
+    }
+    Ok(chosen)
+}
+
+/// Samples of the tissue, its [entrance](Tissue::entrance) first where it has one. Fewer than wanted where draws fail.
+pub(super) fn draw(tissue: &dyn Tissue, wanted: u32, rng: &mut VesselRng) -> Vec<Vec3> {
+    let draws = (0..wanted * DRAWS_PER_SAMPLE).filter_map(|_| tissue.sample(rng));
+    tissue.entrance().into_iter().chain(draws).take(wanted as usize).collect()
+}
+
+/// A point of the tissue one step length from a root: of several directions the one whose point comes out best.
+pub(super) fn beside(tissue: &dyn Tissue, root: &TissuePoint, step: f32, rng: &mut VesselRng) -> TissuePoint {
+    let mut best: Option<(f32, TissuePoint)> = None;
+    for _ in 0..DIRECTIONS {
+        let direction = tangent(root.normal, rng);
+        let point = tissue.closest_point(root.position + direction * step);
+        let error = (point.position.distance(root.position) - step).abs();
+        if best.is_none_or(|(least, _)| error < least) {
+            best = Some((error, point));
+        }
+        // Close enough to take, so that the direction is the seed's and not that of least rounding.
+        if error < 0.1 * step {
+            break;
+        }
+    }
+    best.map_or(*root, |(_, point)| point)
+}
+
+/// A unit vector drawn evenly from the plane across `normal`, or from all directions where that is zero.
+fn tangent(normal: Vec3, rng: &mut VesselRng) -> Vec3 {
+    let random = |rng: &mut VesselRng| 2.0 * rng.random::<f32>() - 1.0;
+    for _ in 0..64 {
+        let point = Vec3::new(random(rng), random(rng), random(rng));
+        // Within the unit ball, directions are even; too near its centre they are rounding. Their shadows on a plane
+        // through the centre are even too.
+        let flat = point - normal * point.dot(normal);
+        if point.length_squared() <= 1.0 && flat.length_squared() > 1.0e-4 {
+            return flat.normalize();
+        }
+    }
+    Vec3::X
+}

@@ -1,0 +1,172 @@
+use super::*;
+use crate::synthesis::mesh::TriangleMesh;
+use crate::synthesis::tissue::{Ball, Cuboid, Disc, MeshSurface, Rectangle, TissueError};
+use bevy_math::Vec2;
+
+const SETTINGS: fn() -> ColonizationSettings = ColonizationSettings::default;
+
+fn at(x: f32, y: f32) -> Vec3 {
+    Vec3::new(x, y, 0.0)
+}
+
+#[test]
+fn the_default_is_an_artery_and_a_vein_beside_it() -> Result<(), TissueError> {
+    let settings = SETTINGS();
+    for tissue in [Box::new(Disc::flat(0.5)?) as Box<dyn Tissue>, Box::new(Ball::new(Vec3::ONE, 0.5)?)] {
+        for seed in 0..50 {
+            let Ok([arteries, veins]) = Roots::default().resolve(&*tissue, &settings, seed) else {
+                panic!("no roots with seed {seed}")
+            };
+            assert_eq!((arteries.len(), veins.len()), (1, 1));
+            let distance = arteries[0].position.distance(veins[0].position);
+            assert!((distance - settings.venous.step_length).abs() < 0.2 * settings.venous.step_length);
+            assert!(tissue.contains(arteries[0].position) && tissue.contains(veins[0].position));
+            assert_eq!(arteries[0].normal, tissue.closest_point(arteries[0].position).normal);
+            let again = Roots::default().resolve(&*tissue, &settings, seed);
+            assert_eq!(again, Ok([arteries, veins]));
+        }
+    }
+    let tissue = Disc::flat(0.5)?;
+    let with_seed = |seed| Roots::default().resolve(&tissue, &settings, seed);
+    assert_ne!(with_seed(1), with_seed(2));
+    Ok(())
+}
+
+#[test]
+fn spread_roots_are_far_apart() -> Result<(), TissueError> {
+    let tissue = Disc::flat(0.5)?;
+    let roots = Roots { arterial: RootPlacement::Spread(12), ..Roots::default() };
+    let Ok([arteries, veins]) = roots.resolve(&tissue, &SETTINGS(), 3) else { panic!("no roots") };
+    assert_eq!((arteries.len(), veins.len()), (12, 12));
+    for (index, root) in arteries.iter().enumerate() {
+        let least = arteries[..index].iter().map(|other| other.position.distance(root.position));
+        assert!(least.fold(f32::INFINITY, f32::min) > 0.2);
+    }
+    let many = Roots { arterial: RootPlacement::Spread(u32::MAX), ..Roots::default() };
+    assert!(matches!(many.resolve(&tissue, &SETTINGS(), 3), Err(RootError::TooMany { .. })));
+    let none = Roots { arterial: RootPlacement::Spread(0), ..Roots::default() };
+    assert_eq!(none.resolve(&tissue, &SETTINGS(), 3), Ok([vec![], vec![]]));
+    Ok(())
+}
+
+#[test]
+fn given_points_are_taken_or_brought_to_the_tissue() -> Result<(), TissueError> {
+    let tissue = Disc::flat(0.5)?;
+    let far = vec![at(-2.0, 0.0)];
+    let roots = Roots {
+        arterial: RootPlacement::Nearest(far.clone()),
+        venous: RootPlacement::Exact(vec![Vec3::new(-0.4, 0.0, 0.01)]),
+        given: [None, None],
+    };
+    let Ok([arteries, veins]) = roots.resolve(&tissue, &SETTINGS(), 0) else { panic!("no roots") };
+    assert!(arteries[0].position.distance(at(-0.5, 0.0)) < 1e-6);
+    assert_eq!(veins[0], TissuePoint { position: Vec3::new(-0.4, 0.0, 0.01), normal: Vec3::Z });
+
+    let with = |arterial| Roots { arterial, ..Roots::default() }.resolve(&tissue, &SETTINGS(), 0);
+    let error = with(RootPlacement::Exact(far));
+    assert!(matches!(error, Err(RootError::TooFar { distance, .. }) if (distance - 1.5).abs() < 1e-6));
+    let error = with(RootPlacement::Nearest(vec![Vec3::NAN]));
+    assert!(matches!(error, Err(RootError::NotFinite { .. })));
+    let error = with(RootPlacement::Nearest(vec![at(1e38, 0.0)]));
+    assert!(matches!(error, Err(RootError::NotFinite { .. })));
+    let error = with(RootPlacement::Exact(vec![at(0.1, 0.0), at(0.0, 0.2), at(0.1, 0.0)]));
+    assert!(matches!(error, Err(RootError::Coincide { .. })));
+    assert_eq!(with(RootPlacement::Beside), Err(RootError::BesideEachOther));
+    assert_eq!(with(RootPlacement::None), Ok([vec![], vec![]]));
+    Ok(())
+}
+
+#[test]
+fn given_trees_must_be_within_reach() -> Result<(), TissueError> {
+    let tissue = Disc::flat(0.5)?;
+    let with = |position: Vec3| {
+        let mut tree = VesselTree::new();
+        tree.push_root(position, 0.01);
+        let given = [Some(tree), Some(VesselTree::new())];
+        Roots { arterial: RootPlacement::None, given, ..Roots::default() }.resolve(&tissue, &SETTINGS(), 0)
+    };
+    let Ok([arteries, veins]) = with(at(0.3, 0.0)) else { panic!("no roots") };
+    assert_eq!((arteries.len(), veins.len()), (0, 1));
+    assert!(matches!(with(at(30.0, 0.0)), Err(RootError::GivenTooFar { .. })));
+    assert!(matches!(with(at(f32::NAN, 0.0)), Err(RootError::GivenNotFinite { node: 0, .. })));
+    Ok(())
+}
+
+/// Shares of tissue further from all roots than a way, as the crow flies.
+fn missed(tissue: &dyn Tissue, roots: &[TissuePoint], way: f32) -> usize {
+    let mut rng = Stream::Statistics.rng(1);
+    let samples = (0..2000).filter_map(|_| tissue.sample(&mut rng));
+    samples.filter(|sample| roots.iter().all(|root| root.position.distance(*sample) > way)).count()
+}
+
+#[test]
+fn compact_tissues_have_one_root_and_long_ones_several_within_reach() -> Result<(), Box<dyn std::error::Error>> {
+    let settings = SETTINGS();
+    let spread = Roots { arterial: RootPlacement::Spread(1), ..Roots::default() };
+    for tissue in [Box::new(Disc::flat(0.5)?) as Box<dyn Tissue>, Box::new(Ball::new(Vec3::ONE, 0.5)?)] {
+        for seed in 0..50 {
+            let roots = Roots::default().resolve(&*tissue, &settings, seed)?;
+            assert_eq!(roots, spread.resolve(&*tissue, &settings, seed)?, "seed {seed} of a compact tissue");
+        }
+    }
+    let strip = Rectangle::flat(Vec2::new(8.0, 0.25))?;
+    let bar = Cuboid::new(Vec3::ZERO, Vec3::new(8.0, 0.5, 0.5))?;
+    for (tissue, size) in [(Box::new(strip) as Box<dyn Tissue>, 1.596), (Box::new(bar), 1.563)] {
+        let way = Roots::DEFAULT_REACH * size;
+        assert!((tissue.extent().equivalent_diameter() - size).abs() < 1e-3);
+        for seed in 0..20 {
+            let [arteries, veins] = Roots::default().resolve(&*tissue, &settings, seed)?;
+            // Two ways of 1.8 a root; no two are nearer than the way from one of several.
+            assert!((3..=8).contains(&arteries.len()), "seed {seed}: {} roots", arteries.len());
+            assert_eq!(arteries.len(), veins.len());
+            assert_eq!(missed(&*tissue, &arteries, way), 0, "seed {seed}");
+        }
+    }
+    Ok(())
+}
+
+/// Two unit squares, one above the other, that face each other or away.
+fn plates(gap: f32, facing: bool) -> MeshSurface {
+    const SIDE: u32 = 20;
+    let corner = |layer: u32, i: u32, j: u32| layer * (SIDE + 1) * (SIDE + 1) + j * (SIDE + 1) + i;
+    let mut corners = Vec::new();
+    let mut triangles = Vec::new();
+    for layer in 0..2 {
+        for j in 0..=SIDE {
+            corners.extend(
+                (0..=SIDE).map(|i| Vec3::new(i as f32, j as f32, 0.0) / SIDE as f32 + gap * layer as f32 * Vec3::Z),
+            );
+        }
+        for (i, j) in (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j))) {
+            let [a, b, c, d] =
+                [corner(layer, i, j), corner(layer, i + 1, j), corner(layer, i + 1, j + 1), corner(layer, i, j + 1)];
+            let up = (layer == 0) == facing;
+            triangles.extend(if up { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
+        }
+    }
+    MeshSurface::new(TriangleMesh::new(corners, triangles, None).expect("a mesh")).expect("a surface")
+}
+
+#[test]
+fn walls_that_face_each_other_have_roots_of_their_own() -> Result<(), RootError> {
+    let settings = SETTINGS();
+    for seed in 0..5 {
+        let [arteries, _] = Roots::default().resolve(&plates(0.02, true), &settings, seed)?;
+        let layers: Vec<bool> = arteries.iter().map(|root| root.position.z > 0.01).collect();
+        assert!(layers.contains(&true) && layers.contains(&false), "seed {seed}: {arteries:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_reach_that_samples_cannot_measure_is_refused() -> Result<(), TissueError> {
+    let tissue = Disc::flat(0.5)?;
+    for reach in [0.0, -1.0, 0.05, f32::NAN, f32::INFINITY] {
+        let roots = Roots { arterial: RootPlacement::Within(reach), ..Roots::default() };
+        assert!(matches!(roots.resolve(&tissue, &SETTINGS(), 0), Err(RootError::Reach { .. })), "{reach}");
+    }
+    let near = Roots { arterial: RootPlacement::Within(Roots::LEAST_REACH), ..Roots::default() };
+    let Ok([arteries, _]) = near.resolve(&tissue, &SETTINGS(), 0) else { panic!("no roots") };
+    assert!(missed(&tissue, &arteries, 0.1) < 20 && arteries.len() < 500, "{} roots", arteries.len());
+    Ok(())
+}

@@ -1,0 +1,163 @@
+//! Roots as many as a tissue needs: one in a compact organ, several in a long one.
+//!
+//! In come a tissue and the way, along the tissue, that the vessels of a root reach; out come roots that together reach all of
+//! it. Ways are measured over samples that are joined to their nearest ones, as by Tenenbaum, de Silva and Langford, "A
+//! Global Geometric Framework for Nonlinear Dimensionality Reduction" (2000), so that the two ends of a bent organ
+//! are far apart, and parts that nothing joins have roots of their own.
+
+use super::{
+    RootError,
+    spread::{SPREAD_SAMPLES, draw},
+};
+use crate::synthesis::{
+    rng::VesselRng,
+    tissue::{Tissue, TissuePoint},
+    tree::System,
+};
+use bevy_math::Vec3;
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use std::{cmp::Reverse, collections::BinaryHeap, num::NonZeroUsize};
+
+/// Samples that each sample is joined to: enough to keep an evenly sampled tissue in one piece.
+const LINKS: NonZeroUsize = NonZeroUsize::new(12).expect("12 is not zero");
+/// How far from the tissue a link may lead, as a share of its length: further than a surface bends away below it, less
+/// than the gap between two folds.
+const GAP: f32 = 0.15;
+/// Points of a link that must be in the tissue, or as near.
+const BETWEEN: u32 = 5;
+/// Cosine of the angle to the normals from which on a link leaves one wall for another.
+const FACING: f32 = 0.5;
+/// Way from one of several roots, as a share of that from an only one: what needs several is narrow, and in a narrow tissue
+/// vessels come forward more slowly.
+const SHARE_OF_SEVERAL: f32 = 0.6;
+/// Samples that are tried as the only root, before there are several.
+const TRIES: u32 = 8;
+/// One sample in so many may stay out of reach. They are the ends of nooks, and bits of tissue too small for a root.
+const SPARED: usize = 200;
+
+/// Roots such that all tissue is within `way` of one, along the tissue.
+///
+/// The seed's first sample is the root if it reaches everything, else the first that does. Where none does, the first
+/// stays, and again and again the sample furthest from all roots becomes another, until they are near enough.
+pub(super) fn within(
+    tissue: &dyn Tissue,
+    system: System,
+    way: f32,
+    rng: &mut VesselRng,
+) -> Result<Vec<TissuePoint>, RootError> {
+    let samples = draw(tissue, SPREAD_SAMPLES, rng);
+    if samples.is_empty() {
+        return Err(RootError::NoRoom { system, wanted: 1, found: 0 });
+    }
+    // Whoever says where vessels enter has said all.
+    let place = |&position: &Vec3| TissuePoint { position, ..tissue.closest_point(position) };
+    if tissue.entrance().is_some() {
+        return Ok(vec![place(&samples[0])]);
+    }
+    let places: Vec<TissuePoint> = samples.iter().map(place).collect();
+    Ok(Web::over(tissue, &places).centers(way).into_iter().map(|center| places[center as usize]).collect())
+}
+
+/// Samples, joined to their nearest ones.
+struct Web {
+    /// Of every sample the others it is joined to, with the way there.
+    links: Vec<Vec<(u32, f32)>>,
+}
+
+impl Web {
+    fn over(tissue: &dyn Tissue, samples: &[TissuePoint]) -> Self {
+        let mut links = vec![Vec::new(); samples.len()];
+        for (a, b) in nearest_pairs(samples) {
+            let ends = [samples[a as usize], samples[b as usize]];
+            if leads_through(tissue, ends) {
+                // A vessel keeps its direction for a while, so that bends of the surface hold it up.
+                let bend = ends[0].normal.distance(ends[1].normal);
+                let length = ends[0].position.distance(ends[1].position) * (1.0 + bend);
+                links[a as usize].push((b, length));
+                links[b as usize].push((a, length));
+            }
+        }
+        Self { links }
+    }
+
+    fn centers(&self, way: f32) -> Vec<u32> {
+        let spared = self.links.len() / SPARED;
+        let missed = |distances: &[f32]| distances.iter().filter(|&&distance| distance > way).count();
+        let from = |sample| {
+            let mut distances = vec![f32::INFINITY; self.links.len()];
+            self.approach(sample, &mut distances);
+            distances
+        };
+        let mut distances = from(0);
+        if missed(&distances) <= spared {
+            return vec![0];
+        }
+        let tries = TRIES.min(self.links.len() as u32);
+        if let Some(center) = (1..tries).find(|&sample| missed(&from(sample)) <= spared) {
+            return vec![center];
+        }
+        let mut chosen = vec![0];
+        while distances.iter().filter(|&&distance| distance > SHARE_OF_SEVERAL * way).count() > spared {
+            let furthest = furthest(&distances);
+            chosen.push(furthest);
+            self.approach(furthest, &mut distances);
+        }
+        chosen
+    }
+
+    /// Lowers the distances from the nearest root to what they are with another root (Dijkstra 1959).
+    fn approach(&self, root: u32, distances: &mut [f32]) {
+        distances[root as usize] = 0.0;
+        // Distances are not negative, so their bits are in their order.
+        let mut waiting = BinaryHeap::from([Reverse((0.0f32.to_bits(), root))]);
+        while let Some(Reverse((bits, sample))) = waiting.pop() {
+            let distance = f32::from_bits(bits);
+            if distance > distances[sample as usize] {
+                continue;
+            }
+            for &(other, link) in &self.links[sample as usize] {
+                let known = &mut distances[other as usize];
+                if distance + link < *known {
+                    *known = distance + link;
+                    waiting.push(Reverse((known.to_bits(), other)));
+                }
+            }
+        }
+    }
+}
+
+/// Every sample with each of those nearest to it, a pair once, in the order of the indices.
+fn nearest_pairs(samples: &[TissuePoint]) -> Vec<(u32, u32)> {
+    let points: Vec<[f32; 3]> = samples.iter().map(|sample| sample.position.to_array()).collect();
+    // Fails only on more points than a u32 counts. Every sample would be a piece of its own.
+    let Ok(index) = ImmutableKdTree::<f32, 3>::new_from_slice(&points) else { return Vec::new() };
+    let mut pairs = Vec::with_capacity(samples.len() * LINKS.get());
+    for (sample, point) in points.iter().enumerate() {
+        // One more, since the nearest is the sample itself.
+        let nearest = index.query(point).nearest_n::<SquaredEuclidean<f32>>(LINKS.saturating_add(1)).execute();
+        let others = nearest.iter().map(|found| found.item as u32).filter(|&other| other != sample as u32);
+        pairs.extend(others.map(|other| (other.min(sample as u32), other.max(sample as u32))));
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// Whether the tissue goes on between two of its points, rather than leaving a gap that vessels would have to cross.
+fn leads_through(tissue: &dyn Tissue, [from, to]: [TissuePoint; 2]) -> bool {
+    let way = to.position - from.position;
+    // Two walls that face each other, such as those of two folds, which may be no further apart than samples are.
+    let steep = FACING * way.length();
+    if from.normal.dot(way) > steep && to.normal.dot(-way) > steep {
+        return false;
+    }
+    let allowed = GAP * way.length();
+    (1..=BETWEEN)
+        .map(|step| from.position + way * (step as f32 / (BETWEEN + 1) as f32))
+        .all(|between| tissue.closest_point(between).position.distance_squared(between) <= allowed * allowed)
+}
+
+/// Of equally far ones the first.
+fn furthest(distances: &[f32]) -> u32 {
+    (1..distances.len()).fold(0, |best, index| if distances[index] > distances[best] { index } else { best }) as u32
+}

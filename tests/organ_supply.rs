@@ -1,0 +1,111 @@
+//! Vessels supply real organs as wholes: no part of the defaults' or an organ preset's organ stays without.
+//!
+//! The organs lie beside the checkout, as `CONTRIBUTING.md` says; without them these tests skip.
+
+#![cfg(all(feature = "mesh_files", feature = "serialize"))]
+
+use bevy_math::Vec3;
+use bevy_vessels::synthesis::{
+    colonization::Growth,
+    io::read_mesh,
+    preset::PresetName,
+    rng::Stream,
+    tissue::{Tissue, TissueMode},
+    tree::{System, statistics},
+};
+use std::{path::Path, sync::Arc};
+
+const ORGANS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs");
+const SEEDS: u64 = 3;
+const SAMPLES: usize = 20_000;
+/// Of an octant with fewer samples than this little is known.
+const LEAST_SAMPLES: usize = 100;
+
+/// Samples of the tissue, by the octant of its box in which they lie.
+fn octants(tissue: &dyn Tissue) -> Vec<Vec<Vec3>> {
+    let mut rng = Stream::Statistics.rng(1);
+    let bounds = tissue.bounds();
+    let middle = Vec3::from(bounds.min + bounds.max) * 0.5;
+    let mut octants = vec![Vec::new(); 8];
+    for sample in (0..SAMPLES).filter_map(|_| tissue.sample(&mut rng)) {
+        let side = sample.cmpgt(middle).bitmask();
+        octants[side as usize].push(sample);
+    }
+    octants.retain(|samples| samples.len() >= LEAST_SAMPLES);
+    octants
+}
+
+/// Share of the least supplied octant within two final birth distances of a node.
+fn worst(growth: &Growth, octants: &[Vec<Vec3>], system: System) -> f32 {
+    let reach = 2.0 * growth.settings().system(system).node_birth_distance * growth.length_scale(system);
+    let shares = octants.iter().filter_map(|samples| statistics::coverage(growth.tree(system), samples, reach));
+    shares.fold(1.0, f32::min)
+}
+
+/// Grows organs with several seeds. In the worst octant arteries and veins must supply at least these shares.
+fn check(organs: &[&str], preset: PresetName, mode: TissueMode, least: [f32; 2]) {
+    for name in organs {
+        let path = Path::new(ORGANS).join(format!("{name}.glb"));
+        if !path.exists() {
+            eprintln!("skipped: there is no {}", path.display());
+            continue;
+        }
+        let mesh = read_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
+        let mut preset = preset.load();
+        preset.tissue.mode = mode;
+        let tissue = preset.tissue.build(&mesh).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let octants = octants(tissue.at_step(preset.settings.steps));
+        for seed in 0..SEEDS {
+            let settings = preset.settings_for(tissue.extent());
+            let mut growth = Growth::new(Arc::clone(&tissue), settings, &preset.roots(), seed)
+                .unwrap_or_else(|error| panic!("{name}: {error}"));
+            growth.run();
+            let shares = System::ALL.map(|system| worst(&growth, &octants, system));
+            println!("{name}, {mode:?}, seed {seed}: {:.2} and {:.2} in the worst octant", shares[0], shares[1]);
+            assert!(
+                shares[0] >= least[0] && shares[1] >= least[1],
+                "{name}, {mode:?}, seed {seed}: only {shares:?} of the worst octant is supplied"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_colon_preset_supplies_guts() {
+    let guts = ["colon_vhf", "colon_vhm", "small_intestine_vhf"];
+    check(&guts, PresetName::Colon, TissueMode::Surface, [0.9, 0.85]);
+}
+
+#[test]
+fn the_kidney_preset_supplies_the_kidney() {
+    check(&["kidney_left_vhf"], PresetName::Kidney, TissueMode::Volume, [0.85, 0.75]);
+}
+
+#[test]
+fn the_liver_preset_supplies_solid_organs() {
+    check(&["liver_vhf", "spleen_vhf_uv"], PresetName::Liver, TissueMode::Volume, [0.85, 0.75]);
+    check(&["liver_vhf"], PresetName::Liver, TissueMode::Staged { surface_steps: 100 }, [0.7, 0.6]);
+}
+
+#[test]
+fn the_eyes_presets_supply_the_eyeball() {
+    check(&["eyeball_mh"], PresetName::Conjunctiva, TissueMode::Surface, [0.9, 0.8]);
+    check(&["eyeball_mh"], PresetName::Retina, TissueMode::Surface, [0.9, 0.8]);
+}
+
+#[test]
+fn the_defaults_supply_every_surface() {
+    let compact = ["bladder_vhf", "eyeball_mh", "heart_vhf", "kidney_left_vhf", "liver_vhf", "spleen_vhf_uv"];
+    check(&compact, PresetName::Paper, TissueMode::Surface, [0.9, 0.8]);
+    check(&["colon_vhf", "colon_vhm"], PresetName::Paper, TissueMode::Surface, [0.9, 0.8]);
+    check(&["small_intestine_vhf"], PresetName::Paper, TissueMode::Surface, [0.4, 0.2]);
+}
+
+#[test]
+fn the_defaults_supply_every_volume() {
+    let solid = ["bladder_vhf", "eyeball_mh", "kidney_left_vhf", "liver_vhf", "spleen_vhf_uv"];
+    check(&solid, PresetName::Paper, TissueMode::Volume, [0.7, 0.6]);
+    // Their arms are narrower than the lengths that are fitted to the whole.
+    check(&["heart_vhf", "colon_vhf", "colon_vhm"], PresetName::Paper, TissueMode::Volume, [0.4, 0.35]);
+    check(&["small_intestine_vhf"], PresetName::Paper, TissueMode::Volume, [0.25, 0.2]);
+}
