@@ -27,7 +27,7 @@ impl Case {
 }
 
 /// A closed mesh that bends both ways.
-fn torus() -> TriangleMesh {
+pub fn torus() -> TriangleMesh {
     const AROUND: u32 = 40;
     const ACROSS: u32 = 20;
     let angle = |step: u32, steps: u32| TAU * step as f32 / steps as f32;

@@ -1,0 +1,47 @@
+//! The same organ in any unit grows the same vessels.
+
+mod common;
+
+use bevy_vessels::synthesis::{
+    colonization::{ColonizationSettings, Growth},
+    mesh::TriangleMesh,
+    roots::Roots,
+    tissue::{TissueMode, TissueSettings},
+    tree::System,
+};
+
+/// An organ of a unit's size, larger by a factor.
+fn grown(mesh: &TriangleMesh, factor: f32, mode: TissueMode, seed: u64) -> Growth {
+    let positions = mesh.positions().iter().map(|&position| position * factor).collect();
+    let mesh = TriangleMesh::new(positions, mesh.triangles().to_vec(), None).expect("a mesh");
+    let tissue = TissueSettings { mode, resolution: 48, ..TissueSettings::default() }.build(&mesh).expect("a tissue");
+    let settings = ColonizationSettings::default().fit(tissue.extent());
+    let mut growth = Growth::new(tissue, settings, &Roots::default(), seed).expect("a growth");
+    growth.run();
+    growth
+}
+
+/// 0.2 m, the same in millimetres, and sizes between them.
+#[test]
+fn metres_millimetres_and_units_grow_the_same_vessels() {
+    let mesh = common::torus();
+    for mode in [TissueMode::Surface, TissueMode::Volume] {
+        for seed in 0..2 {
+            let toy = grown(&mesh, 1.0, mode, seed);
+            for (factor, exact) in [(1.0 / 1024.0, true), (1024.0, true), (0.2, false), (200.0, false)] {
+                let organ = grown(&mesh, factor, mode, seed);
+                for system in System::ALL {
+                    let (a, b) = (toy.tree(system), organ.tree(system));
+                    let case = format!("{mode:?}, seed {seed}, {}, times {factor}", system.name());
+                    if exact {
+                        // Powers of two round as the toy does, so nothing at all may differ.
+                        assert_eq!(a.parents(), b.parents(), "{case}");
+                    }
+                    // Others differ by rounding, which changes which way single vessels go.
+                    let ratio = b.len() as f32 / a.len() as f32;
+                    assert!((ratio - 1.0).abs() < 0.08, "{case}: {} nodes, {} in the toy", b.len(), a.len());
+                }
+            }
+        }
+    }
+}
