@@ -332,7 +332,7 @@ mod tests {
     #[test]
     fn spread_bits_are_three_apart() {
         for bits in [0, 1, 2, 0b1011, 0x15_5555, 0x1f_ffff] {
-            let slow = (0..KEY_BITS).filter(|bit| bits >> bit & 1 == 1).map(|bit| 1u64 << (3 * bit)).sum();
+            let slow: u64 = (0..KEY_BITS).filter(|bit| bits >> bit & 1 == 1).map(|bit| 1u64 << (3 * bit)).sum();
             assert_eq!(spread(bits), slow, "{bits:b}");
         }
     }

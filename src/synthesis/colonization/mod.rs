@@ -23,6 +23,7 @@ mod vacancy;
 
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
+use crate::synthesis::haemodynamics::BedLink;
 use crate::synthesis::roots::{RootError, Roots};
 use crate::synthesis::tissue::{Extent, Tissue, TissuePoint};
 use crate::synthesis::tree::{NodeId, System, VesselTree};
@@ -93,6 +94,7 @@ pub struct Growth {
     vacancy: Vacancy,
     /// Drains on their way from the arteries to the veins.
     handed: Vec<Supplied>,
+    links: Vec<BedLink>,
 }
 
 impl Growth {
@@ -111,8 +113,16 @@ impl Growth {
         let bounds = tissue.bounds();
         let systems = System::ALL.map(|system| SystemGrowth::new(settings.system(system), &bounds));
         let candidates = Candidates::new(seed);
-        let mut growth =
-            Self { tissue, settings, systems, step: 0, candidates, vacancy: Vacancy::default(), handed: Vec::new() };
+        let mut growth = Self {
+            tissue,
+            settings,
+            systems,
+            step: 0,
+            candidates,
+            vacancy: Vacancy::default(),
+            handed: Vec::new(),
+            links: Vec::new(),
+        };
         growth.reset_vacancy();
         growth.plant(&placed, roots);
         Ok(growth)
@@ -132,6 +142,7 @@ impl Growth {
         self.settings = settings;
         self.candidates.restart(seed);
         self.step = 0;
+        self.links.clear();
         self.reset_vacancy();
         self.plant(&placed, roots);
         Ok(())
@@ -179,7 +190,7 @@ impl Growth {
         let (tissue, settings, step) = (self.tissue.as_ref(), &self.settings, self.step);
         let [arteries, veins] = &mut self.systems;
         let (born, arterial) = grow_arteries(arteries, &mut self.candidates, &mut self.vacancy, tissue, settings, step);
-        let venous = grow_veins(veins, arteries.supplied(), tissue, settings, step);
+        let venous = grow_veins(veins, arteries.supplied(), &mut self.links, tissue, settings, step);
         StepReport { step, sampled: settings.samples, born, systems: [arterial, venous] }
     }
 
@@ -196,11 +207,11 @@ impl Growth {
         let (first, last) = (self.step + 1, self.settings.steps);
         let (tissue, settings) = (self.tissue.as_ref(), &self.settings);
         let (candidates, vacancy) = (&mut self.candidates, &mut self.vacancy);
-        let ([arteries, veins], handed) = (&mut self.systems, &mut self.handed);
+        let ([arteries, veins], handed, links) = (&mut self.systems, &mut self.handed, &mut self.links);
         for step in first..=last.saturating_add(1) {
             parallel::join(
                 || step <= last && grow_arteries(arteries, candidates, vacancy, tissue, settings, step).0 > 0,
-                || step > first && grow_veins(veins, handed, tissue, settings, step - 1).new_nodes > 0,
+                || step > first && grow_veins(veins, handed, links, tissue, settings, step - 1).new_nodes > 0,
             );
             handed.clear();
             handed.extend_from_slice(arteries.supplied());
@@ -265,6 +276,13 @@ impl Growth {
         self.systems[system.index()].length_scale()
     }
 
+    /// Where blood comes over from the arteries to the veins: for each drain that both have supplied, the node of either
+    /// that did. Through these the two trees are one circulation
+    /// ([`Circulation`](crate::synthesis::haemodynamics::Circulation)).
+    pub fn bed_links(&self) -> &[BedLink] {
+        &self.links
+    }
+
     /// Where a node is drawn: lifted off the surface by its radius where the settings say so.
     ///
     /// # Panics
@@ -323,6 +341,7 @@ fn grow_arteries(
 fn grow_veins(
     veins: &mut SystemGrowth,
     supplied: &[Supplied],
+    links: &mut Vec<BedLink>,
     tissue: &dyn Tissue,
     settings: &ColonizationSettings,
     step: u32,
@@ -331,6 +350,7 @@ fn grow_veins(
     if !veins.forest.tree.is_empty() {
         veins.receive(supplied);
         report = veins.grow(ground(tissue, settings, step), step);
+        links.extend(veins.links());
     }
     veins.advance_tissue(step);
     report

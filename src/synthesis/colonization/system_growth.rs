@@ -7,8 +7,9 @@ use super::lengths::Lengths;
 use super::perception::{self, Pull, Search};
 use super::settings::SystemSettings;
 use crate::synthesis::attraction::Drains;
+use crate::synthesis::haemodynamics::BedLink;
 use crate::synthesis::tissue::{Tissue, TissuePoint};
-use crate::synthesis::tree::{NO_PARENT, VesselTree};
+use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d};
 
 /// Where new nodes may be put in a step.
@@ -39,6 +40,8 @@ pub(crate) struct Supplied {
     pub drain: u32,
     /// Where it was.
     pub position: Vec3,
+    /// The node that supplied it: its nearest open one.
+    pub node: u32,
 }
 
 /// The forest and the drains of one system, with the lengths in force.
@@ -57,6 +60,8 @@ pub(crate) struct SystemGrowth {
     angles: Vec<f32>,
     /// Drains supplied in the last step.
     supplied: Vec<Supplied>,
+    /// Of drains that came from the other system, the node there that supplied them, by slot.
+    givers: Vec<u32>,
 }
 
 /// A new node nearer than this share of a step length to another one is not made.
@@ -79,6 +84,7 @@ impl SystemGrowth {
             pulling: Vec::new(),
             angles: Vec::new(),
             supplied: Vec::new(),
+            givers: Vec::new(),
         };
         system.restart(settings, bounds);
         system
@@ -92,6 +98,7 @@ impl SystemGrowth {
         self.forest.reset(bounds, self.lengths.node_cell(), settings.terminal_radius, settings.bifurcation_exponent);
         self.drains.reset(bounds, self.lengths.drain_cell());
         self.supplied.clear();
+        self.givers.clear();
     }
 
     /// Adds roots, and trees to go on growing from.
@@ -130,8 +137,20 @@ impl SystemGrowth {
     /// Takes drains that the other system has supplied.
     pub fn receive(&mut self, supplied: &[Supplied]) {
         for supplied in supplied {
-            self.drains.add(supplied.position);
+            let slot = self.drains.add(supplied.position) as usize;
+            if slot == self.givers.len() {
+                self.givers.push(supplied.node);
+            } else {
+                self.givers[slot] = supplied.node;
+            }
         }
+    }
+
+    /// Where blood comes over from the other system by the drains supplied in the last step: that system's node, and this
+    /// one's.
+    pub fn links(&self) -> impl Iterator<Item = BedLink> + '_ {
+        let giver = |supplied: &Supplied| NodeId(self.givers[supplied.drain as usize]);
+        self.supplied.iter().map(move |supplied| BedLink { arterial: giver(supplied), venous: NodeId(supplied.node) })
     }
 
     /// Drains supplied in the last step.
@@ -202,9 +221,10 @@ impl SystemGrowth {
     fn kill(&mut self) {
         self.supplied.clear();
         let reach = self.lengths.kill * self.lengths.kill;
-        for &Pull { drain, .. } in &self.pulls {
+        for &Pull { drain, node } in &self.pulls {
             if self.drains.hearing(drain).closest <= reach {
-                self.supplied.push(Supplied { drain, position: self.drains.position(drain) });
+                let (position, node) = (self.drains.position(drain), self.drains.hearing(drain).node().unwrap_or(node));
+                self.supplied.push(Supplied { drain, position, node });
                 self.drains.remove(drain);
             }
         }

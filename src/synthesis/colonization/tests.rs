@@ -210,3 +210,18 @@ fn changed_radii_are_those_that_changed() {
         }
     }
 }
+
+#[test]
+fn blood_comes_over_where_both_systems_supplied_a_drain() {
+    let mut growth = growth(ColonizationSettings::default());
+    growth.run();
+    let (arteries, veins) = (growth.tree(System::Arterial).positions(), growth.tree(System::Venous).positions());
+    let reach = SystemSettings::DEFAULT_INFLUENCE_DISTANCE * 3.5;
+    assert!(growth.bed_links().len() > veins.len() / 4, "{} links", growth.bed_links().len());
+    for link in growth.bed_links() {
+        let gap = arteries[link.arterial.index()].distance(veins[link.venous.index()]);
+        assert!(gap <= reach, "{link:?} spans {gap}");
+    }
+    growth.restart(ColonizationSettings { steps: 1, ..Default::default() }, &roots(), 1).expect("valid settings");
+    assert!(growth.bed_links().is_empty());
+}
