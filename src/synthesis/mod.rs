@@ -7,9 +7,10 @@
 //! 2. [`roots`] say where vessels enter it.
 //! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`].
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
+//! 5. [`haemodynamics`] lets blood flow through them.
 //!
 //! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`rng`] hands out
-//! random streams, [`point_grid`] finds points by distance.
+//! random streams, [`point_grid`] finds points by distance, [`units`] turn lengths into metres.
 //!
 //! # Words
 //!
@@ -49,6 +50,7 @@
 
 mod attraction;
 pub mod colonization;
+pub mod haemodynamics;
 pub mod instances;
 pub mod io;
 pub mod mesh;
@@ -60,3 +62,4 @@ pub mod rng;
 pub mod roots;
 pub mod tissue;
 pub mod tree;
+pub mod units;
