@@ -7,7 +7,7 @@
 //! 2. [`roots`] say where vessels enter it.
 //! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`].
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
-//! 5. [`haemodynamics`] lets blood flow through them.
+//! 5. [`haemodynamics`] lets blood flow through them, and [`wound`] lets it out.
 //!
 //! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`rng`] hands out
 //! random streams, [`point_grid`] finds points by distance, [`units`] turn lengths into metres.
@@ -63,3 +63,4 @@ pub mod roots;
 pub mod tissue;
 pub mod tree;
 pub mod units;
+pub mod wound;
