@@ -7,10 +7,11 @@
 //! 2. [`roots`] say where vessels enter it.
 //! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`].
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
-//! 5. [`binding`] moves the vessels with an organ that deforms; [`wound`] finds the segments that a blade meets.
+//! 5. [`wound`] is where blades sever them, [`haemodynamics`] lets blood flow through them and out of wounds, and
+//!    [`binding`] moves them with an organ that deforms.
 //!
 //! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`rng`] hands out
-//! random streams, [`point_grid`] finds points by distance.
+//! random streams, [`point_grid`] finds points by distance, [`units`] turn lengths into metres.
 //!
 //! # Words
 //!
@@ -51,6 +52,7 @@
 mod attraction;
 pub mod binding;
 pub mod colonization;
+pub mod haemodynamics;
 pub mod instances;
 pub mod io;
 pub mod mesh;
@@ -63,4 +65,5 @@ pub mod rng;
 pub mod roots;
 pub mod tissue;
 pub mod tree;
+pub mod units;
 pub mod wound;

@@ -1,0 +1,380 @@
+//! Arteries and veins joined through the capillary bed.
+//!
+//! In: the networks of two trees, and the links between their nodes: each a stretch of bed with the bed's resistance.
+//! Out: both networks solved, so that what an artery gives into a link arrives in the vein. Terminals without a link
+//! drain into the bed's pool, as they do alone.
+//!
+//! The links make loops, so that no pair of sweeps solves both trees at once; but each alone is solved exactly. With T
+//! the matrix of a tree whose links end in a given pressure, and E that of the links between them, the arterial
+//! pressures obey (Tₐ − E·Tᵥ⁻¹·Eᵀ)·p = b. The matrix is symmetric and positive, and conjugate gradients preconditioned
+//! by Tₐ⁻¹ need one pair of sweeps of each tree in a pass. The error falls by the factor (1 − √(1 − c))/(1 + √(1 − c))
+//! or better, where c < 1 is the largest share of a change of pressure that comes back through the links from the other
+//! side. It is small where the bed resists as it does in a body, with a fourth of the pressure or more: then some ten
+//! passes reach rounding. It nears 1 where links hardly resist, and passes become many; the limit of passes is an error.
+//! A piece that hangs between links alone could have any pressure; a leak of 10⁻¹¹ of each link into the pool gives it
+//! the pool's. Open ends are solved for by Newton's method around it, as in a single tree.
+
+use super::{
+    FlowError, Network,
+    network::{FIRST, SOURCE, node_slot},
+    open_ends::OpenEnds,
+};
+use crate::synthesis::tree::NodeId;
+
+/// A stretch of capillary bed between an artery and a vein.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub struct BedLink {
+    /// The node that gives blood.
+    pub arterial: NodeId,
+    /// The node that takes it.
+    pub venous: NodeId,
+}
+
+/// The nodes of one network that links end in, and its answer to currents into them.
+#[derive(Clone, Debug, Default)]
+struct Side {
+    /// Slots of the nodes, in rising order.
+    slots: Vec<u32>,
+    /// For every link, the place of its node in `slots`.
+    of_links: Vec<u32>,
+    /// Currents of all slots, and in turn their pressures.
+    currents: Vec<f64>,
+}
+
+impl Side {
+    fn new(nodes: impl Iterator<Item = NodeId> + Clone) -> Self {
+        let mut slots: Vec<u32> = nodes.clone().map(|node| node_slot(node.index()) as u32).collect();
+        slots.sort_unstable();
+        slots.dedup();
+        let place = |node: NodeId| slots.partition_point(|&slot| slot < node_slot(node.index()) as u32) as u32;
+        let of_links = nodes.map(place).collect();
+        Self { slots, of_links, currents: Vec::new() }
+    }
+
+    /// Pressures at the linked nodes that currents into them cause, all else being at pressure 0: T⁻¹.
+    fn respond(&mut self, network: &Network, currents: &[f64], pressures: &mut [f64]) {
+        self.currents.clear();
+        self.currents.resize(network.slots.len(), 0.0);
+        for (&slot, &current) in self.slots.iter().zip(currents) {
+            self.currents[slot as usize] = current;
+        }
+        for index in (FIRST..network.slots.len()).rev() {
+            let given = self.currents[index] * network.slots[index].through;
+            self.currents[network.links[index].upstream as usize] += given;
+        }
+        self.currents[..FIRST].fill(0.0);
+        for index in FIRST..network.slots.len() {
+            let above = self.currents[network.links[index].upstream as usize];
+            let slot = &network.slots[index];
+            self.currents[index] = slot.through * (above + slot.resistance * self.currents[index]);
+        }
+        for (pressure, &slot) in pressures.iter_mut().zip(&self.slots) {
+            *pressure = self.currents[slot as usize];
+        }
+    }
+
+    /// What the links bring to this side from pressures on the other: E.
+    fn carry(&self, other: &Self, conductance: f64, pressures: &[f64], currents: &mut [f64]) {
+        currents.fill(0.0);
+        for (&here, &there) in self.of_links.iter().zip(&other.of_links) {
+            currents[here as usize] += conductance * pressures[there as usize];
+        }
+    }
+
+    /// Forgets what links bring to roots, whose pressure is given: there is nothing to balance.
+    fn excuse_roots(&self, network: &Network, currents: &mut [f64]) {
+        for (current, &slot) in currents.iter_mut().zip(&self.slots) {
+            if network.links[slot as usize].upstream == SOURCE {
+                *current = 0.0;
+            }
+        }
+    }
+
+    /// Pressures of the linked nodes in the last solution.
+    fn pressures(&self, network: &Network) -> Vec<f64> {
+        self.slots.iter().map(|&slot| network.slots[slot as usize].pressure).collect()
+    }
+
+    /// Sets what the links bring, and solves the network with its ends as they are loaded.
+    fn drive(&self, network: &mut Network, currents: &[f64]) {
+        for (&slot, &current) in self.slots.iter().zip(currents) {
+            network.beds[slot as usize].s = current;
+            network.shunts[slot as usize] = network.beds[slot as usize];
+        }
+        network.load_stumps();
+        network.sum_all();
+        network.spread_pressures();
+    }
+}
+
+/// Arteries and veins of an organ, joined through the bed.
+#[derive(Clone, Debug)]
+pub struct Circulation {
+    arterial: Network,
+    venous: Network,
+    links: usize,
+    conductance: f64,
+    sides: [Side; 2],
+}
+
+impl Circulation {
+    /// Passes of the conjugate gradients before they count as failed; some ten are usual.
+    const MOST_PASSES: usize = 500;
+    /// Imbalance of a linked node, relative to the largest flow in a link, and correction of its pressure, relative to the
+    /// largest, at which they end.
+    const ACCURACY: f64 = 1e-12;
+    /// Rounding of a pressure, relative to the largest.
+    const ROUNDING: f64 = 1e-14;
+    /// Passes of Newton's method for the open ends before it counts as failed; some five are usual.
+    const MOST_ROUNDS: usize = 60;
+    /// Those after which it is damped.
+    const UNDAMPED: usize = 20;
+
+    /// Joins two networks by links. A node may have several, and needs not be a terminal.
+    ///
+    /// # Errors
+    /// When a node is not of its network, or the arterial network's bed has no resistance, which is that of each link.
+    pub fn new(arterial: Network, venous: Network, links: &[BedLink]) -> Result<Self, FlowError> {
+        let resistance = arterial.settings.bed.resistance.ok_or(FlowError::BedWithoutResistance)?;
+        let mut circulation = Self {
+            arterial,
+            venous,
+            links: links.len(),
+            conductance: 1.0 / resistance.pascal_seconds_per_cubic_metre(),
+            sides: [Side::new(links.iter().map(|link| link.arterial)), Side::new(links.iter().map(|link| link.venous))],
+        };
+        // Links conduct alike from both sides.
+        circulation.venous.settings.bed.resistance = Some(resistance);
+        circulation.arterial.set_links(links.iter().map(|link| link.arterial))?;
+        circulation.venous.set_links(links.iter().map(|link| link.venous))?;
+        Ok(circulation)
+    }
+
+    /// The arteries.
+    pub fn arterial(&self) -> &Network {
+        &self.arterial
+    }
+
+    /// The arteries, to be wounded or driven by another pressure.
+    pub fn arterial_mut(&mut self) -> &mut Network {
+        &mut self.arterial
+    }
+
+    /// The veins.
+    pub fn venous(&self) -> &Network {
+        &self.venous
+    }
+
+    /// The veins, to be wounded or driven by another pressure.
+    pub fn venous_mut(&mut self) -> &mut Network {
+        &mut self.venous
+    }
+
+    /// Number of links.
+    pub fn links(&self) -> usize {
+        self.links
+    }
+
+    /// Gives the two networks back, apart again.
+    pub fn into_networks(mut self) -> [Network; 2] {
+        for network in [&mut self.arterial, &mut self.venous] {
+            // No node is refused where none is named.
+            let _ = network.set_links(std::iter::empty());
+        }
+        [self.arterial, self.venous]
+    }
+
+    /// Brings pressures and flows of both networks up to date, those at open ends too.
+    ///
+    /// Costs two pairs of sweeps over both trees for each pass of the conjugate gradients, and some five times that
+    /// where there are open ends, less where little has changed since the last time.
+    ///
+    /// # Errors
+    /// When one of the iterations did not converge.
+    pub fn solve(&mut self) -> Result<(), FlowError> {
+        self.share_bed_pressure();
+        let has_ends = [&self.arterial, &self.venous].iter().any(|network| !network.ends.all().is_empty());
+        for network in [&mut self.arterial, &mut self.venous] {
+            network.prepare_joined();
+        }
+        let mut residual = f64::INFINITY;
+        for round in 0..Self::MOST_ROUNDS {
+            for network in [&mut self.arterial, &mut self.venous] {
+                network.linearise_ends();
+            }
+            self.balance()?;
+            if !has_ends {
+                return Ok(());
+            }
+            let damped = round >= Self::UNDAMPED;
+            let residuals = [&mut self.arterial, &mut self.venous].map(|network| network.accept_ends(damped));
+            residual = residuals[0].max(residuals[1]);
+            if residual <= 1.0 {
+                return self.finish();
+            }
+        }
+        let what = "the flow through the open ends of a circulation";
+        let residual = residual * OpenEnds::ACCURACY;
+        Err(FlowError::NotConverged { what, passes: Self::MOST_ROUNDS, residual })
+    }
+
+    /// Both count pressures from that of the same pool.
+    fn share_bed_pressure(&mut self) {
+        let moved = self.venous.bed - self.arterial.bed;
+        self.venous.source += moved;
+        self.venous.bed = self.arterial.bed;
+    }
+
+    /// Turns the ends' tangents into what they draw, and solves with that once more.
+    fn finish(&mut self) -> Result<(), FlowError> {
+        for network in [&mut self.arterial, &mut self.venous] {
+            network.finish_ends();
+        }
+        self.balance()
+    }
+
+    /// Solves both trees with their open ends as they are linearised: conjugate gradients on the arterial pressures.
+    fn balance(&mut self) -> Result<(), FlowError> {
+        let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
+        let g = *conductance;
+        let (n, m) = (arteries.slots.len(), veins.slots.len());
+        let (mut into_arteries, mut into_veins) = (vec![0.0; n], vec![0.0; m]);
+        // From the last solution: each tree once, and the imbalance that is left at the arteries' nodes.
+        let before = veins.pressures(venous);
+        arteries.carry(veins, g, &before, &mut into_arteries);
+        arteries.drive(arterial, &into_arteries);
+        let mut pressures = arteries.pressures(arterial);
+        veins.carry(arteries, g, &pressures, &mut into_veins);
+        veins.drive(venous, &into_veins);
+        let after = veins.pressures(venous);
+        let change: Vec<f64> = after.iter().zip(&before).map(|(a, b)| a - b).collect();
+        let mut residual = vec![0.0; n];
+        arteries.carry(veins, g, &change, &mut residual);
+        arteries.excuse_roots(arterial, &mut residual);
+        let tolerated = self.tolerated(&pressures, &after);
+        let Self { arterial, venous, sides: [arteries, veins], .. } = self;
+
+        let (mut z, mut carried) = (vec![0.0; n], vec![0.0; n]);
+        let mut answer = vec![0.0; m];
+        arteries.respond(arterial, &residual, &mut z);
+        let (mut direction, mut image) = (z.clone(), residual.clone());
+        let mut product = dot(&residual, &z);
+        let mut passes = 0;
+        while largest(&residual) > tolerated.flow || largest(&z) > tolerated.pressure {
+            if passes == Self::MOST_PASSES {
+                let residual = Self::ACCURACY * largest(&residual) / tolerated.flow;
+                return Err(FlowError::NotConverged { what: "the flow through the bed", passes, residual });
+            }
+            passes += 1;
+            veins.carry(arteries, g, &direction, &mut into_veins);
+            veins.respond(venous, &into_veins, &mut answer);
+            arteries.carry(veins, g, &answer, &mut carried);
+            arteries.excuse_roots(arterial, &mut carried);
+            let curvature: f64 = direction.iter().zip(image.iter().zip(&carried)).map(|(d, (i, c))| d * (i - c)).sum();
+            if !(curvature > 0.0) {
+                let residual = Self::ACCURACY * largest(&residual) / tolerated.flow;
+                return Err(FlowError::NotConverged { what: "the flow through the bed", passes, residual });
+            }
+            let step = product / curvature;
+            for at in 0..n {
+                pressures[at] += step * direction[at];
+                residual[at] -= step * (image[at] - carried[at]);
+            }
+            arteries.respond(arterial, &residual, &mut z);
+            let next = dot(&residual, &z);
+            let turn = next / product;
+            product = next;
+            for at in 0..n {
+                direction[at] = z[at] + turn * direction[at];
+                image[at] = residual[at] + turn * image[at];
+            }
+        }
+        veins.carry(arteries, g, &pressures, &mut into_veins);
+        veins.drive(venous, &into_veins);
+        arteries.carry(veins, g, &veins.pressures(venous), &mut into_arteries);
+        arteries.drive(arterial, &into_arteries);
+        Ok(())
+    }
+
+    /// What is small enough: an imbalance relative to the largest flow in a link, and a correction relative to the
+    /// pressures, or as much as rounding of the pressures makes of them.
+    fn tolerated(&self, arterial: &[f64], venous: &[f64]) -> Tolerated {
+        let [arteries, veins] = &self.sides;
+        let links = arteries.of_links.iter().zip(&veins.of_links);
+        let flows = links.map(|(&a, &v)| self.conductance * (arterial[a as usize] - venous[v as usize]).abs());
+        let pressure = largest(arterial).max(largest(venous)).max(self.arterial.source.abs());
+        let rounding = Self::ROUNDING * self.conductance * pressure;
+        Tolerated { flow: Self::ACCURACY * flows.fold(0.0, f64::max) + rounding, pressure: Self::ACCURACY * pressure }
+    }
+}
+
+/// How far from the solution conjugate gradients may end.
+struct Tolerated {
+    /// In m³/s.
+    flow: f64,
+    /// In Pa.
+    pressure: f64,
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |largest, value| largest.max(value.abs()))
+}
+
+impl Network {
+    /// Joins nodes to another network, in place of those that were: each as often as it is named.
+    pub(super) fn set_links(&mut self, nodes: impl Iterator<Item = NodeId> + Clone) -> Result<(), FlowError> {
+        for node in nodes.clone() {
+            self.check(node)?;
+        }
+        let none = vec![0; self.len()];
+        let before = std::mem::replace(&mut self.link_counts, none);
+        for node in nodes {
+            self.link_counts[node.index()] += 1;
+        }
+        for node in 0..self.len() {
+            if before.get(node).is_some_and(|&count| count > 0) || self.link_counts[node] > 0 {
+                self.set_bed(node);
+            }
+        }
+        self.sums_stale = true;
+        self.ends.is_untraced = true;
+        Ok(())
+    }
+
+    /// Pressure outside above the bed's.
+    pub(super) fn ambient(&self) -> f64 {
+        self.settings.ambient.pascals() - self.bed
+    }
+
+    /// Everything that a joined solution begins with. What changes from here on makes a later solution of this network
+    /// alone begin anew.
+    fn prepare_joined(&mut self) {
+        self.sums_stale = true;
+        self.ends.is_untraced = true;
+    }
+
+    /// What the ends draw by their tangents, by pressures above the bed's.
+    fn linearise_ends(&mut self) {
+        self.ends.linearise();
+        self.ends.count_from(-self.ambient());
+    }
+
+    fn accept_ends(&mut self, damped: bool) -> f64 {
+        let ambient = self.ambient();
+        let slots = &self.slots;
+        self.ends.count_from(ambient);
+        let rounding = 1e-11 * self.source.abs().max(ambient.abs());
+        self.ends.accept(|end| slots[end.attached as usize].pressure - ambient, rounding, damped)
+    }
+
+    fn finish_ends(&mut self) {
+        let ambient = self.ambient();
+        let slots = &self.slots;
+        self.ends.finish(|end| slots[end.attached as usize].pressure - ambient, ambient, self.bed);
+    }
+}

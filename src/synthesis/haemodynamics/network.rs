@@ -1,0 +1,342 @@
+//! A tree as a network of resistances, kept up to date with the tree.
+//!
+//! The network has two slots more than the tree has nodes: slot 0 is the reference, held at the bed's pressure, from
+//! which pressures are counted; slot 1 is the source, held at the root pressure, and the parent of every root. So every
+//! slot has one above it, and no loop asks whether a node is a root or cut off.
+
+use super::{FlowError, FlowSettings, Interruption, open_ends::OpenEnds};
+use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
+use crate::synthesis::units::Pressure;
+
+/// Slot held at the bed's pressure. Also stands for "none" in lists of slots.
+pub(super) const REFERENCE: u32 = 0;
+/// Slot held at the root pressure.
+pub(super) const SOURCE: u32 = 1;
+/// Slots before that of node 0.
+pub(super) const FIRST: usize = 2;
+
+/// Resistance that lets nothing through. Far from the ends of `f64`, so that products with it stay finite.
+pub(super) const CLOSED: f64 = 1e200;
+
+/// Conductance of a bed that holds its terminal at its own pressure, in conductances of the terminal's segment. Large
+/// enough that 1 + HELD is HELD in `f64`: it makes no difference to infinity, and needs no case of its own.
+const HELD: f64 = (1u64 << 60) as f64;
+
+/// What leaks from a link into the bed's pool, in conductances of the link. It holds pieces that hang between links
+/// alone, and is lost among the digits of every flow.
+const LEAK: f64 = 1e-11;
+
+/// Least length of a segment, in its radii. A segment of no length is a joint; this keeps its conductance finite.
+const LEAST_LENGTH: f64 = 1e-6;
+
+/// Where a slot stands in the tree.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Link {
+    /// The slot that the segment draws from: the parent, or the reference where the segment is interrupted.
+    pub upstream: u32,
+    /// The parent's slot, whether the segment is interrupted or not.
+    pub parent: u32,
+    /// Child of the highest index, or none.
+    pub first_child: u32,
+    /// The parent's next child in falling order of the index, or none.
+    pub next_sibling: u32,
+}
+
+/// A current Y·p − S that leaves a node of pressure p.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Shunt {
+    /// Conductance, in m³/(s·Pa).
+    pub y: f64,
+    /// Current at pressure 0 with its sign turned, in m³/s.
+    pub s: f64,
+}
+
+impl Shunt {
+    /// The same current, by pressures that count from one of `pressure`.
+    pub fn counted_from(self, pressure: f64) -> Self {
+        Self { y: self.y, s: self.s - self.y * pressure }
+    }
+}
+
+/// State of a segment and the node that it ends in.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Slot {
+    /// Resistance of the segment, in Pa·s/m³.
+    pub resistance: f64,
+    /// All that leaves the node downwards.
+    pub below: Shunt,
+    /// 1/(1 + R·Y): share of `below` that the segment passes on.
+    pub through: f64,
+    /// Pressure of the node above the bed's, in Pa, as of the last solution.
+    pub pressure: f64,
+}
+
+/// What [`Network::update`] found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NetworkUpdate {
+    /// Nodes that are new.
+    pub appended: usize,
+    /// Segments whose radius or length changed.
+    pub changed: usize,
+    /// Whether the tree is another one, not the old one grown on: the network was made anew, without interruptions.
+    pub replaced: bool,
+}
+
+/// The network of resistances of one tree, with its wounds and its solution.
+#[derive(Clone, Debug)]
+pub struct Network {
+    pub(super) settings: FlowSettings,
+    pub(super) radii: Vec<f32>,
+    pub(super) lengths: Vec<f64>,
+    /// 8µ/(πr⁴) of every node's segment.
+    pub(super) per_length: Vec<f64>,
+    pub(super) links: Vec<Link>,
+    pub(super) slots: Vec<Slot>,
+    /// The bed below each slot's node.
+    pub(super) beds: Vec<Shunt>,
+    /// Links that join each node to another network; empty where none is.
+    pub(super) link_counts: Vec<u32>,
+    /// The bed, and the open ends as of the last solution.
+    pub(super) shunts: Vec<Shunt>,
+    /// Root pressure above the bed's, in Pa.
+    pub(super) source: f64,
+    /// Pressure of the bed, in Pa.
+    pub(super) bed: f64,
+    /// In the order of the node.
+    pub(super) interruptions: Vec<(u32, Interruption)>,
+    pub(super) ends: OpenEnds,
+    pub(super) pressures: Vec<f64>,
+    pub(super) flows: Vec<f64>,
+    /// Whether `below` and `through` have to be summed again from all tips.
+    pub(super) sums_stale: bool,
+    pub(super) path: Vec<u32>,
+}
+
+impl Network {
+    /// The network of a tree, not solved yet, at the mean of the root pressure.
+    ///
+    /// # Errors
+    /// When the tree is not well formed, or a setting is outside its limits.
+    pub fn new(tree: &VesselTree, settings: FlowSettings) -> Result<Self, FlowError> {
+        settings.validate()?;
+        tree.validate()?;
+        let mut network = Self {
+            source: 0.0,
+            bed: settings.bed.pressure.pascals(),
+            settings,
+            radii: Vec::new(),
+            lengths: Vec::new(),
+            per_length: Vec::new(),
+            links: Vec::new(),
+            slots: Vec::new(),
+            beds: Vec::new(),
+            link_counts: Vec::new(),
+            shunts: Vec::new(),
+            interruptions: Vec::new(),
+            ends: OpenEnds::default(),
+            pressures: Vec::new(),
+            flows: Vec::new(),
+            sums_stale: true,
+            path: Vec::new(),
+        };
+        network.clear();
+        network.set_root_pressure(network.settings.root.mean())?;
+        network.append(tree);
+        Ok(network)
+    }
+
+    /// Follows a tree that grew, whose radii changed or whose nodes moved. Only what changed is computed again.
+    ///
+    /// # Errors
+    /// When a number of the tree is not finite, or a radius not above 0. The network is as before, then.
+    pub fn update(&mut self, tree: &VesselTree) -> Result<NetworkUpdate, FlowError> {
+        tree.validate()?;
+        let before = self.len();
+        let goes_on = before <= tree.len()
+            && (0..before).all(|node| slot_of(tree.parents()[node]) == self.links[node + FIRST].parent);
+        if !goes_on {
+            self.clear();
+            self.append(tree);
+            return Ok(NetworkUpdate { appended: tree.len(), changed: 0, replaced: true });
+        }
+        let mut changed = 0;
+        for node in 0..before {
+            let (radius, length) = (tree.radii()[node], self.length_in(tree, node));
+            let is_wider = radius.to_bits() != self.radii[node].to_bits();
+            if is_wider || length.to_bits() != self.lengths[node].to_bits() {
+                self.lengths[node] = length;
+                if is_wider {
+                    self.set_radius(node, radius);
+                }
+                self.set_resistance(node);
+                changed += 1;
+            }
+        }
+        self.append(tree);
+        let appended = tree.len() - before;
+        if changed + appended > 0 {
+            self.sums_stale = true;
+            self.measure_ends();
+        }
+        Ok(NetworkUpdate { appended, changed, replaced: false })
+    }
+
+    /// Forgets the tree.
+    fn clear(&mut self) {
+        self.radii.clear();
+        self.lengths.clear();
+        self.per_length.clear();
+        self.interruptions.clear();
+        self.ends.clear();
+        self.link_counts.clear();
+        self.links.clear();
+        self.links.resize(FIRST, Link::default());
+        self.slots.clear();
+        self.slots.resize(FIRST, Slot::default());
+        for shunts in [&mut self.beds, &mut self.shunts] {
+            shunts.clear();
+            shunts.resize(FIRST, Shunt::default());
+        }
+    }
+
+    /// Takes over the nodes that the tree has more.
+    fn append(&mut self, tree: &VesselTree) {
+        let before = self.len();
+        for node in before..tree.len() {
+            let (slot, parent) = (node + FIRST, slot_of(tree.parents()[node]));
+            let next_sibling = std::mem::replace(&mut self.links[parent as usize].first_child, slot as u32);
+            self.links.push(Link { upstream: parent, parent, first_child: REFERENCE, next_sibling });
+            self.slots.push(Slot::default());
+            self.beds.push(Shunt::default());
+            self.shunts.push(Shunt::default());
+            self.radii.push(0.0);
+            self.per_length.push(0.0);
+            let length = self.length_in(tree, node);
+            self.lengths.push(length);
+            self.set_radius(node, tree.radii()[node]);
+        }
+        // After all links, which say what is a terminal and no longer is one.
+        for node in before..tree.len() {
+            self.set_resistance(node);
+            if let Some(parent) = (self.links[node + FIRST].parent as usize).checked_sub(FIRST) {
+                self.set_bed(parent);
+            }
+        }
+        self.pressures.resize(tree.len(), 0.0);
+        self.flows.resize(tree.len(), 0.0);
+        self.sums_stale = true;
+    }
+
+    /// Length of a segment in metres, 0 for a root.
+    fn length_in(&self, tree: &VesselTree, node: usize) -> f64 {
+        if tree.parents()[node] == NO_PARENT {
+            return 0.0;
+        }
+        tree.segment_length(node) * self.settings.scale.metres()
+    }
+
+    fn set_radius(&mut self, node: usize, radius: f32) {
+        self.radii[node] = radius;
+        let metres = self.settings.scale.to_metres(radius);
+        let viscosity = self.settings.viscosity.in_vessel(2.0 * metres);
+        let square = metres * metres;
+        self.per_length[node] = 8.0 * viscosity / (std::f64::consts::PI * square * square);
+    }
+
+    /// Resistance of a node's segment while it is whole, in Pa·s/m³; 0 for a root.
+    pub(super) fn whole_resistance(&self, node: usize) -> f64 {
+        if self.links[node + FIRST].parent == SOURCE {
+            return 0.0;
+        }
+        let least = LEAST_LENGTH * self.settings.scale.to_metres(self.radii[node]);
+        // At least so much that its inverse stays finite, at most what lets nothing through.
+        (self.per_length[node] * self.lengths[node].max(least)).clamp(1.0 / CLOSED, CLOSED)
+    }
+
+    fn set_resistance(&mut self, node: usize) {
+        let is_whole = self.links[node + FIRST].upstream != REFERENCE;
+        self.slots[node + FIRST].resistance = if is_whole { self.whole_resistance(node) } else { CLOSED };
+        self.set_bed(node);
+    }
+
+    /// What a node drains into: its links, or the pool if it is a terminal without any. A root without children is no
+    /// terminal.
+    pub(super) fn set_bed(&mut self, node: usize) {
+        let link = self.links[node + FIRST];
+        let is_terminal = link.first_child == REFERENCE && link.parent != SOURCE;
+        let links = self.link_counts.get(node).copied().unwrap_or(0);
+        let y = match self.settings.bed.resistance {
+            Some(resistance) if links > 0 => {
+                f64::from(links) * (1.0 + LEAK) / resistance.pascal_seconds_per_cubic_metre()
+            }
+            _ if !is_terminal => 0.0,
+            Some(resistance) => 1.0 / resistance.pascal_seconds_per_cubic_metre(),
+            None => HELD / self.whole_resistance(node),
+        };
+        self.beds[node + FIRST] = Shunt { y, s: 0.0 };
+        self.shunts[node + FIRST] = self.beds[node + FIRST];
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.radii.len()
+    }
+
+    /// Whether there is no node.
+    pub fn is_empty(&self) -> bool {
+        self.radii.is_empty()
+    }
+
+    /// The settings it was made with.
+    pub fn settings(&self) -> &FlowSettings {
+        &self.settings
+    }
+
+    /// Holds all roots at a pressure from now on.
+    ///
+    /// # Errors
+    /// When the pressure is not finite.
+    pub fn set_root_pressure(&mut self, pressure: Pressure) -> Result<(), FlowError> {
+        FlowError::check_finite("the root pressure in mmHg", pressure.mmhg())?;
+        self.source = pressure.pascals() - self.bed;
+        self.ends.is_unsolved = true;
+        Ok(())
+    }
+
+    /// Holds the bed's pool at a pressure from now on, other than that of the settings.
+    ///
+    /// # Errors
+    /// When the pressure is not finite.
+    pub fn set_bed_pressure(&mut self, pressure: Pressure) -> Result<(), FlowError> {
+        FlowError::check_finite("the bed's pressure in mmHg", pressure.mmhg())?;
+        self.source += self.bed - pressure.pascals();
+        self.bed = pressure.pascals();
+        self.ends.is_unsolved = true;
+        Ok(())
+    }
+
+    /// The pressure that the bed's pool is held at.
+    pub fn bed_pressure(&self) -> Pressure {
+        Pressure::from_pascals(self.bed)
+    }
+
+    /// The pressure that roots are held at.
+    pub fn root_pressure(&self) -> Pressure {
+        Pressure::from_pascals(self.source + self.bed)
+    }
+
+    /// Checks that a node is there.
+    pub(super) fn check(&self, node: NodeId) -> Result<(), FlowError> {
+        if node.index() < self.len() { Ok(()) } else { Err(FlowError::NoSuchNode { node: node.0, nodes: self.len() }) }
+    }
+}
+
+/// Slot of a node, or of the source for a root's missing parent.
+fn slot_of(node: u32) -> u32 {
+    if node == NO_PARENT { SOURCE } else { node + FIRST as u32 }
+}
+
+/// Slot of a node.
+pub(super) fn node_slot(node: usize) -> usize {
+    node + FIRST
+}

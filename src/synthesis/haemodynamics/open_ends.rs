@@ -1,0 +1,365 @@
+//! Open ends, and how much they let out.
+
+use super::{
+    FlowError, Network, Outlet,
+    network::{Shunt, node_slot},
+    skeleton::Skeleton,
+};
+use crate::synthesis::tree::NodeId;
+use crate::synthesis::units::{BLOOD_DENSITY, Flow, Pressure, Scale};
+
+/// Which end of a gap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub enum EndSide {
+    /// The end towards the root: it bleeds what the root drives.
+    Proximal,
+    /// The end towards the terminals: it bleeds back what the bed drives.
+    Distal,
+}
+
+/// One open end of a severed vessel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenEnd {
+    /// End node of the severed segment.
+    pub node: NodeId,
+    /// Which end of the gap.
+    pub side: EndSide,
+    /// Where on the segment, as a share of the way from its parent.
+    pub along: f32,
+    /// The hole.
+    pub outlet: Outlet,
+    /// Share of the hole's area that clotting has left open.
+    pub opening: f64,
+    /// What leaves through it, in m³/s.
+    pub(super) flow: f64,
+    /// Pressure in the vessel before the hole, in Pa.
+    pressure: f64,
+    /// Area of the hole in m², before clotting.
+    area: f64,
+    /// Slot of the node that feeds the end.
+    pub(super) attached: u32,
+    /// Resistance of the vessel between that node and the hole.
+    piece: f64,
+    /// K of the whole hole: Δp = K·Q².
+    orifice: f64,
+    /// The joint of the skeleton at the node.
+    joint: u32,
+    /// What the end draws from the node, as of the last solution.
+    stump: Shunt,
+}
+
+impl OpenEnd {
+    /// An end that has not been measured.
+    pub(super) fn new(node: NodeId, side: EndSide, along: f32, outlet: Outlet) -> Self {
+        Self {
+            node,
+            side,
+            along,
+            outlet,
+            opening: 1.0,
+            flow: 0.0,
+            pressure: 0.0,
+            area: 0.0,
+            attached: 0,
+            piece: 0.0,
+            orifice: 0.0,
+            joint: 0,
+            stump: Shunt::default(),
+        }
+    }
+
+    /// What leaves through it; never negative.
+    pub fn flow(&self) -> Flow {
+        Flow::from_cubic_metres_per_second(self.flow)
+    }
+
+    /// Pressure in the vessel before the hole.
+    pub fn pressure(&self) -> Pressure {
+        Pressure::from_pascals(self.pressure)
+    }
+
+    /// Mean velocity in the hole, in m/s; 0 for one that has closed.
+    pub fn velocity(&self) -> f64 {
+        if self.flow > 0.0 { self.flow / (self.area * self.opening) } else { 0.0 }
+    }
+
+    pub(super) fn is_proximal(&self) -> bool {
+        self.side == EndSide::Proximal
+    }
+
+    /// Whether it is the same hole, not one that a later cut made on the same segment.
+    fn is_same(&self, other: &Self) -> bool {
+        (self.node, self.side, self.along, self.outlet) == (other.node, other.side, other.along, other.outlet)
+    }
+
+    /// Sets what follows from the segment and the hole.
+    fn measure(&mut self, attached: u32, piece: f64, scale: Scale, discharge: f64) {
+        let radius = scale.to_metres(self.outlet.radius);
+        self.area = std::f64::consts::PI * radius * radius;
+        let passing = discharge * self.area;
+        self.orifice = BLOOD_DENSITY / (2.0 * passing * passing);
+        self.attached = attached;
+        self.piece = piece;
+    }
+
+    /// K of what is open of the hole.
+    fn narrowed(&self) -> f64 {
+        self.orifice / (self.opening * self.opening)
+    }
+
+    /// The flow that a difference of pressure drives through piece and hole: Δ = R·Q + K·Q².
+    fn driven(&self, difference: f64) -> f64 {
+        if !(difference > 0.0 && self.opening > 0.0) {
+            return 0.0;
+        }
+        let root = (self.piece * self.piece + 4.0 * self.narrowed() * difference).sqrt();
+        2.0 * difference / (self.piece + root)
+    }
+}
+
+/// All open ends of a network.
+#[derive(Clone, Debug, Default)]
+pub(super) struct OpenEnds {
+    /// In the order of the node, proximal before distal.
+    list: Vec<OpenEnd>,
+    pub skeleton: Skeleton,
+    /// Whether the skeleton has to be traced again.
+    pub is_untraced: bool,
+    /// Whether flows have to be solved for again.
+    pub is_unsolved: bool,
+    /// Whether the network's sums don't have the flows yet.
+    is_unloaded: bool,
+}
+
+impl OpenEnds {
+    /// Passes after which an iteration that circles is damped.
+    const UNDAMPED: usize = 20;
+    /// Passes of the iteration before it counts as failed; some five are usual.
+    const MOST_PASSES: usize = 200;
+    /// Change of a flow, relative to it, below which the iteration ends. It converges quadratically, so that the law
+    /// then holds to the square of this.
+    pub const ACCURACY: f64 = 1e-8;
+    /// Flow that counts as none, relative to the largest.
+    const NEGLIGIBLE: f64 = 1e-14;
+
+    pub fn all(&self) -> &[OpenEnd] {
+        &self.list
+    }
+
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.is_untraced = true;
+    }
+
+    /// Puts ends in the place of all that a segment had. One that is the same keeps its state.
+    pub fn replace(&mut self, node: NodeId, ends: [Option<OpenEnd>; 2]) {
+        let from = self.list.partition_point(|end| end.node < node);
+        let to = self.list.partition_point(|end| end.node <= node);
+        let kept = |end: OpenEnd| {
+            let before = self.list[from..to].iter().find(|before| before.is_same(&end));
+            let mut end = before.copied().unwrap_or(end);
+            // The network below it is another one now.
+            end.stump = Shunt::default();
+            end
+        };
+        let ends = ends.map(|end| end.map(kept));
+        self.list.splice(from..to, ends.into_iter().flatten());
+        self.is_untraced = true;
+    }
+
+    pub fn set_opening(&mut self, index: usize, share: f64) {
+        self.is_unsolved |= self.list[index].opening.to_bits() != share.to_bits();
+        self.list[index].opening = share;
+    }
+
+    /// Finds the flows of all ends at once.
+    ///
+    /// Newton's method on Δ = R·Q + K·Q² in the flows, in which the law is convex: from a flow too large it comes down to
+    /// the solution without passing it. Each pass solves the skeleton exactly. `source` and `ambient` are above the bed's
+    /// pressure `bed`.
+    pub fn solve(&mut self, source: f64, ambient: f64, bed: f64) -> Result<(), FlowError> {
+        if !std::mem::take(&mut self.is_unsolved) {
+            return Ok(());
+        }
+        self.is_unloaded = true;
+        if self.list.is_empty() {
+            return Ok(());
+        }
+        self.start(source, ambient);
+        let mut residual = f64::INFINITY;
+        for pass in 0..Self::MOST_PASSES {
+            residual = self.pass(source, ambient, pass >= Self::UNDAMPED);
+            if residual <= 1.0 {
+                let skeleton = std::mem::take(&mut self.skeleton);
+                self.finish(|end| skeleton.pressure(end.joint), ambient, bed);
+                self.skeleton = skeleton;
+                return Ok(());
+            }
+        }
+        self.is_unsolved = true;
+        let residual = residual * Self::ACCURACY;
+        Err(FlowError::NotConverged { what: "the flow through open ends", passes: Self::MOST_PASSES, residual })
+    }
+
+    /// First guess: the last flow, or what an end alone would let out. An end with too little pressure while all are
+    /// closed has no flow, since others can only take pressure from it.
+    fn start(&mut self, source: f64, ambient: f64) {
+        self.skeleton.begin(ambient);
+        self.skeleton.solve(source, ambient);
+        for end in &mut self.list {
+            let alone = end.driven(self.skeleton.pressure(end.joint));
+            end.flow = if end.flow > 0.0 { end.flow.min(alone) } else { alone };
+        }
+    }
+
+    /// One pass. Returns the largest change of a flow, in units of what is tolerated.
+    fn pass(&mut self, source: f64, ambient: f64, damped: bool) -> f64 {
+        self.linearise();
+        self.skeleton.begin(ambient);
+        for end in &self.list {
+            self.skeleton.draw(end.joint, end.stump);
+        }
+        self.skeleton.solve(source, ambient);
+        let skeleton = std::mem::take(&mut self.skeleton);
+        let residual = self.accept(|end| skeleton.pressure(end.joint), 0.0, damped);
+        self.skeleton = skeleton;
+        residual
+    }
+
+    /// What every end draws by the tangent to its law at its flow, by pressures above that outside.
+    pub fn linearise(&mut self) {
+        for end in &mut self.list {
+            end.stump = Shunt::default();
+            if end.opening == 0.0 {
+                end.flow = 0.0;
+            }
+            if end.flow > 0.0 {
+                let slope = end.piece + 2.0 * end.narrowed() * end.flow;
+                let y = 1.0 / slope.max(f64::MIN_POSITIVE.sqrt());
+                end.stump = Shunt { y, s: -y * end.narrowed() * end.flow * end.flow };
+            }
+        }
+    }
+
+    /// What the ends draw, by pressures that count from one of `pressure`.
+    pub fn count_from(&mut self, pressure: f64) {
+        for end in &mut self.list {
+            end.stump = end.stump.counted_from(pressure);
+        }
+    }
+
+    /// Takes the flows that follow from the pressures of a linearised solution, which are above that outside and exact to
+    /// `rounding`. Returns the largest change of a flow, in units of what is tolerated.
+    pub fn accept(&mut self, pressure: impl Fn(&OpenEnd) -> f64, rounding: f64, damped: bool) -> f64 {
+        let largest = self.list.iter().map(|end| end.flow).fold(0.0, f64::max);
+        let mut residual = 0.0_f64;
+        for end in &mut self.list {
+            let pressure = pressure(end);
+            let new =
+                if end.flow > 0.0 { (end.stump.y * pressure - end.stump.s).max(0.0) } else { end.driven(pressure) };
+            let tolerated = Self::ACCURACY * new + Self::NEGLIGIBLE * largest.max(new) + rounding * end.stump.y;
+            let change = (new - end.flow).abs();
+            if change > 0.0 {
+                residual = residual.max(change / tolerated);
+            }
+            end.flow = if damped { 0.5 * (new + end.flow) } else { new };
+        }
+        residual
+    }
+
+    /// Pressures, and what the ends draw as conductances to the outside, by pressures above the bed's. The pressures of
+    /// the solution are above that outside.
+    pub fn finish(&mut self, pressure: impl Fn(&OpenEnd) -> f64, ambient: f64, bed: f64) {
+        for end in &mut self.list {
+            let difference = pressure(end);
+            let is_open = end.flow > 0.0 && difference > 0.0;
+            end.stump = Shunt::default();
+            if is_open {
+                let y = end.flow / difference;
+                end.stump = Shunt { y, s: y * ambient };
+            } else {
+                end.flow = 0.0;
+            }
+            end.pressure = ambient + difference - end.piece * end.flow + bed;
+        }
+    }
+}
+
+impl Network {
+    /// Measures all ends again, after segments changed.
+    pub(super) fn measure_ends(&mut self) {
+        for index in 0..self.ends.list.len() {
+            self.measure_end(index);
+        }
+        self.ends.is_untraced = true;
+    }
+
+    /// Measures the ends of one segment.
+    pub(super) fn measure_ends_of(&mut self, node: NodeId) {
+        for index in 0..self.ends.list.len() {
+            if self.ends.list[index].node == node {
+                self.measure_end(index);
+            }
+        }
+    }
+
+    fn measure_end(&mut self, index: usize) {
+        let OpenEnd { node, side, along, .. } = self.ends.list[index];
+        let whole = self.whole_resistance(node.index());
+        let slot = node_slot(node.index());
+        let (attached, share) = match side {
+            EndSide::Proximal => (self.links[slot].parent, along),
+            EndSide::Distal => (slot as u32, 1.0 - along),
+        };
+        let discharge = f64::from(self.settings.discharge_coefficient);
+        self.ends.list[index].measure(attached, whole * f64::from(share), self.settings.scale, discharge);
+    }
+
+    /// Traces the skeleton again where that is due.
+    pub(super) fn trace_ends(&mut self) {
+        if !std::mem::take(&mut self.ends.is_untraced) {
+            return;
+        }
+        let mut skeleton = std::mem::take(&mut self.ends.skeleton);
+        skeleton.trace(self, self.ends.list.iter().map(|end| end.attached));
+        self.ends.skeleton = skeleton;
+        for end in &mut self.ends.list {
+            end.joint = self.ends.skeleton.joint_at(end.attached);
+        }
+        self.ends.is_unsolved = true;
+    }
+
+    /// Puts the flows of the open ends into the network's sums.
+    pub(super) fn load_ends(&mut self) {
+        if !std::mem::take(&mut self.ends.is_unloaded) {
+            return;
+        }
+        self.load_stumps();
+        for at in 0..self.ends.skeleton.active().len() {
+            self.sum_at(self.ends.skeleton.active()[at]);
+        }
+    }
+
+    /// Puts what the open ends draw into the shunts of their nodes.
+    pub(super) fn load_stumps(&mut self) {
+        for end in &self.ends.list {
+            self.shunts[end.attached as usize] = self.beds[end.attached as usize];
+        }
+        for end in &self.ends.list {
+            let shunt = &mut self.shunts[end.attached as usize];
+            shunt.y += end.stump.y;
+            shunt.s += end.stump.s;
+        }
+    }
+
+    /// What leaves one node that is no child: the bed, and its open ends as of the last solution.
+    pub(super) fn load_shunt(&mut self, slot: u32) {
+        let mut shunt = self.beds[slot as usize];
+        for end in self.ends.list.iter().filter(|end| end.attached == slot) {
+            shunt.y += end.stump.y;
+            shunt.s += end.stump.s;
+        }
+        self.shunts[slot as usize] = shunt;
+    }
+}

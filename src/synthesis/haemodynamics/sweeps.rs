@@ -1,0 +1,128 @@
+//! The solution: sums from the tips to the roots, pressures from the roots to the tips, and both along one path.
+
+use super::{
+    FlowError, Network,
+    network::{FIRST, REFERENCE, SOURCE, Shunt, node_slot},
+};
+use crate::synthesis::tree::NodeId;
+use crate::synthesis::units::Pressure;
+
+impl Network {
+    /// Brings pressures and flows of all nodes up to date.
+    ///
+    /// # Errors
+    /// When the flow through the open ends did not converge.
+    pub fn solve(&mut self) -> Result<(), FlowError> {
+        self.settle()?;
+        self.spread_pressures();
+        Ok(())
+    }
+
+    /// Brings open ends and sums up to date, without pressures and flows of all nodes.
+    ///
+    /// Costs what the paths from the open ends to the roots are long; nothing that grows with the tree, unless the tree
+    /// itself has changed.
+    ///
+    /// # Errors
+    /// When the flow through the open ends did not converge.
+    pub fn settle(&mut self) -> Result<(), FlowError> {
+        self.solve_ends()?;
+        self.load_ends();
+        Ok(())
+    }
+
+    /// Brings the flow at open ends up to date, and no more: neither sums nor other pressures.
+    ///
+    /// # Errors
+    /// When it did not converge.
+    pub fn solve_ends(&mut self) -> Result<(), FlowError> {
+        if std::mem::take(&mut self.sums_stale) {
+            self.sum_all();
+        }
+        self.trace_ends();
+        self.ends.solve(self.source, self.ambient(), self.bed)
+    }
+
+    /// Pressure of one node, found along its path to the root.
+    ///
+    /// # Errors
+    /// When there is no such node, or the flow through the open ends did not converge.
+    pub fn pressure_at(&mut self, node: NodeId) -> Result<Pressure, FlowError> {
+        self.check(node)?;
+        self.settle()?;
+        let mut path = std::mem::take(&mut self.path);
+        path.clear();
+        let mut slot = node_slot(node.index()) as u32;
+        while slot > SOURCE {
+            path.push(slot);
+            slot = self.links[slot as usize].upstream;
+        }
+        let mut pressure = if slot == SOURCE { self.source } else { 0.0 };
+        for &slot in path.iter().rev() {
+            let slot = &self.slots[slot as usize];
+            pressure = slot.through * (pressure + slot.resistance * slot.below.s);
+        }
+        self.path = path;
+        Ok(Pressure::from_pascals(pressure + self.bed))
+    }
+
+    /// Sums of all nodes, children in falling order of their index.
+    pub(super) fn sum_all(&mut self) {
+        for (slot, &shunt) in self.slots.iter_mut().zip(&self.shunts) {
+            slot.below = shunt;
+        }
+        for index in (FIRST..self.slots.len()).rev() {
+            let slot = &mut self.slots[index];
+            slot.through = 1.0 / (1.0 + slot.resistance * slot.below.y);
+            let given = Shunt { y: slot.below.y * slot.through, s: slot.below.s * slot.through };
+            let upstream = &mut self.slots[self.links[index].upstream as usize].below;
+            upstream.y += given.y;
+            upstream.s += given.s;
+        }
+    }
+
+    /// The sums of one node again, from its children, bit for bit as [`sum_all`](Self::sum_all) has them.
+    pub(super) fn sum_at(&mut self, index: u32) {
+        let mut below = self.shunts[index as usize];
+        let mut child = self.links[index as usize].first_child;
+        while child != REFERENCE {
+            let link = self.links[child as usize];
+            if link.upstream == index {
+                let slot = &self.slots[child as usize];
+                below.y += slot.below.y * slot.through;
+                below.s += slot.below.s * slot.through;
+            }
+            child = link.next_sibling;
+        }
+        let slot = &mut self.slots[index as usize];
+        slot.below = below;
+        slot.through = 1.0 / (1.0 + slot.resistance * below.y);
+    }
+
+    /// The sums of a node and of all above it.
+    pub(super) fn sum_path(&mut self, mut index: u32) {
+        while index > SOURCE {
+            self.sum_at(index);
+            index = self.links[index as usize].upstream;
+        }
+    }
+
+    /// Pressures and flows of all nodes, from the sums.
+    pub(super) fn spread_pressures(&mut self) {
+        self.slots[REFERENCE as usize].pressure = 0.0;
+        self.slots[SOURCE as usize].pressure = self.source;
+        for index in FIRST..self.slots.len() {
+            let above = self.slots[self.links[index].upstream as usize].pressure;
+            let slot = &mut self.slots[index];
+            slot.pressure = slot.through * (above + slot.resistance * slot.below.s);
+            self.pressures[index - FIRST] = slot.pressure + self.bed;
+            self.flows[index - FIRST] = slot.through * (slot.below.y * above - slot.below.s);
+        }
+        for &(node, _) in &self.interruptions {
+            self.flows[node as usize] = 0.0;
+        }
+        for end in self.ends.all().iter().filter(|end| end.is_proximal()) {
+            self.flows[end.node.index()] = end.flow;
+        }
+    }
+}
