@@ -106,8 +106,8 @@ impl Drains {
         self.states.len() - self.free.len()
     }
 
-    /// Adds a drain that is to look for a node.
-    pub fn add(&mut self, position: Vec3) {
+    /// Adds a drain that is to look for a node, and gives its slot.
+    pub fn add(&mut self, position: Vec3) -> u32 {
         let slot = if let Some(slot) = self.free.pop() {
             self.grid.replace(slot, position);
             slot
@@ -119,6 +119,7 @@ impl Drains {
         self.hearing[slot as usize] = Hearing::NOBODY;
         self.states[slot as usize] = State::Searching;
         self.awake.push(slot);
+        slot
     }
 
     /// Removes a living drain.
@@ -135,9 +136,9 @@ impl Drains {
         self.grid.point(slot)
     }
 
-    /// Positions of all living drains, in the order of their slots.
-    pub fn positions(&self) -> impl Iterator<Item = Vec3> + '_ {
-        self.slots().map(|slot| self.position(slot))
+    /// Slots and positions of all living drains, in the order of their slots.
+    pub fn living(&self) -> impl Iterator<Item = (u32, Vec3)> + '_ {
+        self.slots().map(|slot| (slot, self.position(slot)))
     }
 
     /// The living drains' slots, in order.

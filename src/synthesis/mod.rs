@@ -49,9 +49,11 @@
 //! # }
 //! ```
 
+mod alias;
 mod attraction;
 pub mod binding;
 pub mod colonization;
+mod draws;
 pub mod haemodynamics;
 pub mod instances;
 pub mod io;

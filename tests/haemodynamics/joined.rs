@@ -95,6 +95,7 @@ fn what_arteries_give_arrives_in_the_veins() {
         let mut organ = organ(&mut rng, 150, bed);
         organ.circulation.solve().unwrap();
         assert!(organ.imbalance() < 1e-7, "seed {seed}: {}", organ.imbalance());
+        assert!(organ.circulation.passes() < 200, "seed {seed}: {} passes", organ.circulation.passes());
         let trees = organ.trees.clone();
         wound(&mut rng, organ.circulation.arterial_mut(), &trees[0], 8);
         wound(&mut rng, organ.circulation.venous_mut(), &trees[1], 8);
@@ -201,6 +202,33 @@ fn pressures_of_both_trees_agree_with_a_dense_solver() {
                 );
             }
         }
+    }
+}
+
+#[test]
+fn links_may_come_and_go() {
+    for seed in 0..10 {
+        let mut rng = rng(seed);
+        let mut organ = organ(&mut rng, 80, 2.0);
+        organ.circulation.solve().unwrap();
+        let before = organ.circulation.arterial().flows().to_vec();
+        let links = std::mem::take(&mut organ.links);
+        organ.circulation.set_links(&links[..5]).unwrap();
+        organ.links = links[..5].to_vec();
+        organ.circulation.solve().unwrap();
+        assert!(organ.imbalance() < 1e-7, "seed {seed}: {}", organ.imbalance());
+        organ.circulation.set_links(&links).unwrap();
+        organ.circulation.solve().unwrap();
+        let largest = before.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        for (found, expected) in organ.circulation.arterial().flows().iter().zip(&before) {
+            assert!((found - expected).abs() < 1e-9 * largest, "seed {seed}: {found}, not {expected}");
+        }
+        // Apart again, they are the networks that they were.
+        let [mut arterial, _] = organ.circulation.clone().into_networks();
+        arterial.solve().unwrap();
+        let mut alone = Network::new(&organ.trees[0], resisting(2.0)).unwrap();
+        alone.solve().unwrap();
+        assert_eq!(arterial.flows(), alone.flows(), "seed {seed}");
     }
 }
 

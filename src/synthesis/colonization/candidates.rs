@@ -3,6 +3,7 @@
 //! Every block of every step has its own stretch of the random stream. So what is drawn does not depend on who draws it.
 
 use super::parallel;
+use super::vacancy::Vacancy;
 use crate::synthesis::rng::{Stream, VesselRng};
 use crate::synthesis::tissue::Tissue;
 use bevy_math::Vec3;
@@ -34,7 +35,14 @@ impl Candidates {
     }
 
     /// Draws `count` candidates in a step, and drops those that are `refused`.
-    pub fn draw(&mut self, tissue: &dyn Tissue, step: u32, count: u32, refused: impl Fn(Vec3) -> bool + Sync) {
+    pub fn draw(
+        &mut self,
+        tissue: &dyn Tissue,
+        vacancy: &Vacancy,
+        step: u32,
+        count: u32,
+        refused: impl Fn(Vec3) -> bool + Sync,
+    ) {
         self.used = count.div_ceil(BLOCK) as usize;
         if self.blocks.len() < self.used {
             self.blocks.resize_with(self.used, Vec::new);
@@ -45,7 +53,10 @@ impl Candidates {
             let mut rng = rng.clone();
             rng.set_word_pos((u128::from(step) << 32 | index as u128) << STRETCH);
             block.clear();
-            tissue.draw(&mut rng, BLOCK.min(count - first), block);
+            let count = BLOCK.min(count - first);
+            if !vacancy.draw(tissue, &mut rng, count, block) {
+                tissue.draw(&mut rng, count, block);
+            }
             block.retain(|&candidate| candidate.is_finite() && !refused(candidate));
         });
     }

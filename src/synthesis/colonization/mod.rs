@@ -19,6 +19,7 @@ pub mod settings;
 mod system_growth;
 #[cfg(test)]
 mod tests;
+mod vacancy;
 
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
@@ -28,7 +29,8 @@ use crate::synthesis::tree::{NodeId, System, VesselTree};
 use bevy_math::Vec3;
 use candidates::Candidates;
 use std::sync::Arc;
-use system_growth::{Ground, SystemGrowth};
+use system_growth::{Ground, Supplied, SystemGrowth};
+use vacancy::Vacancy;
 
 /// What one step did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -88,8 +90,9 @@ pub struct Growth {
     systems: [SystemGrowth; 2],
     step: u32,
     candidates: Candidates,
+    vacancy: Vacancy,
     /// Drains on their way from the arteries to the veins.
-    handed: Vec<Vec3>,
+    handed: Vec<Supplied>,
 }
 
 impl Growth {
@@ -108,7 +111,9 @@ impl Growth {
         let bounds = tissue.bounds();
         let systems = System::ALL.map(|system| SystemGrowth::new(settings.system(system), &bounds));
         let candidates = Candidates::new(seed);
-        let mut growth = Self { tissue, settings, systems, step: 0, candidates, handed: Vec::new() };
+        let mut growth =
+            Self { tissue, settings, systems, step: 0, candidates, vacancy: Vacancy::default(), handed: Vec::new() };
+        growth.reset_vacancy();
         growth.plant(&placed, roots);
         Ok(growth)
     }
@@ -127,6 +132,7 @@ impl Growth {
         self.settings = settings;
         self.candidates.restart(seed);
         self.step = 0;
+        self.reset_vacancy();
         self.plant(&placed, roots);
         Ok(())
     }
@@ -141,6 +147,12 @@ impl Growth {
         let arteries = System::Arterial.index();
         let given = roots.given[arteries].as_ref().is_some_and(|tree| !tree.is_empty());
         if placed[arteries].is_empty() && !given { Err(GrowthError::NoArterialRoot) } else { Ok(placed) }
+    }
+
+    fn reset_vacancy(&mut self) {
+        let arterial = self.settings.system(System::Arterial);
+        let samples = u64::from(self.settings.steps) * u64::from(self.settings.samples);
+        self.vacancy.reset([arterial.node_birth_distance, arterial.drain_birth_distance], samples);
     }
 
     fn plant(&mut self, placed: &[Vec<TissuePoint>; 2], roots: &Roots) {
@@ -166,7 +178,7 @@ impl Growth {
         self.step += 1;
         let (tissue, settings, step) = (self.tissue.as_ref(), &self.settings, self.step);
         let [arteries, veins] = &mut self.systems;
-        let (born, arterial) = grow_arteries(arteries, &mut self.candidates, tissue, settings, step);
+        let (born, arterial) = grow_arteries(arteries, &mut self.candidates, &mut self.vacancy, tissue, settings, step);
         let venous = grow_veins(veins, arteries.supplied(), tissue, settings, step);
         StepReport { step, sampled: settings.samples, born, systems: [arterial, venous] }
     }
@@ -182,11 +194,12 @@ impl Growth {
     /// take the next one, on another thread if there is one.
     pub fn run(&mut self) {
         let (first, last) = (self.step + 1, self.settings.steps);
-        let (tissue, settings, candidates) = (self.tissue.as_ref(), &self.settings, &mut self.candidates);
+        let (tissue, settings) = (self.tissue.as_ref(), &self.settings);
+        let (candidates, vacancy) = (&mut self.candidates, &mut self.vacancy);
         let ([arteries, veins], handed) = (&mut self.systems, &mut self.handed);
         for step in first..=last.saturating_add(1) {
             parallel::join(
-                || step <= last && grow_arteries(arteries, candidates, tissue, settings, step).0 > 0,
+                || step <= last && grow_arteries(arteries, candidates, vacancy, tissue, settings, step).0 > 0,
                 || step > first && grow_veins(veins, handed, tissue, settings, step - 1).new_nodes > 0,
             );
             handed.clear();
@@ -239,7 +252,7 @@ impl Growth {
 
     /// Drains of a system that wait to be supplied.
     pub fn drains(&self, system: System) -> impl Iterator<Item = Vec3> + '_ {
-        self.systems[system.index()].drains.positions()
+        self.systems[system.index()].drains.living().map(|(_, position)| position)
     }
 
     /// Number of drains of a system that wait to be supplied.
@@ -249,7 +262,7 @@ impl Growth {
 
     /// λ_t of a system: what its lengths are multiplied by at the present size of the tissue.
     pub fn length_scale(&self, system: System) -> f32 {
-        self.systems[system.index()].tissue_size().recip()
+        self.systems[system.index()].length_scale()
     }
 
     /// Where a node is drawn: lifted off the surface by its radius where the settings say so.
@@ -282,14 +295,26 @@ impl Growth {
 fn grow_arteries(
     arteries: &mut SystemGrowth,
     candidates: &mut Candidates,
+    vacancy: &mut Vacancy,
     tissue: &dyn Tissue,
     settings: &ColonizationSettings,
     step: u32,
 ) -> (u32, SystemReport) {
     let ground = ground(tissue, settings, step);
-    candidates.draw(ground.tissue, step, settings.samples, |candidate| arteries.refuses(candidate));
-    let born = candidates.iter().map(|candidate| u32::from(arteries.offer_drain(candidate))).sum();
+    // A staged tissue is another one from stage to stage, and has no pieces of its own.
+    if tissue.stage(1).is_none() {
+        vacancy.prepare(tissue, arteries.length_scale(), arteries.forest.tree.positions(), arteries.drains.living());
+    }
+    candidates.draw(ground.tissue, vacancy, step, settings.samples, |candidate| arteries.refuses(candidate));
+    let mut born = 0;
+    for candidate in candidates.iter() {
+        if let Some(drain) = arteries.offer_drain(candidate) {
+            vacancy.add_drain(drain, candidate);
+            born += 1;
+        }
+    }
     let report = arteries.grow(ground, step);
+    arteries.supplied().iter().for_each(|supplied| vacancy.remove_drain(supplied.drain, supplied.position));
     arteries.advance_tissue(step);
     (born, report)
 }
@@ -297,7 +322,7 @@ fn grow_arteries(
 /// Hands over the drains that the arteries `supplied` in this step, and grows the veins towards them.
 fn grow_veins(
     veins: &mut SystemGrowth,
-    supplied: &[Vec3],
+    supplied: &[Supplied],
     tissue: &dyn Tissue,
     settings: &ColonizationSettings,
     step: u32,

@@ -32,6 +32,15 @@ impl Ground<'_> {
     }
 }
 
+/// A drain that a vessel has supplied.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Supplied {
+    /// The slot that it had.
+    pub drain: u32,
+    /// Where it was.
+    pub position: Vec3,
+}
+
 /// The forest and the drains of one system, with the lengths in force.
 #[derive(Debug)]
 pub(crate) struct SystemGrowth {
@@ -47,7 +56,7 @@ pub(crate) struct SystemGrowth {
     pulling: Vec<Vec3>,
     angles: Vec<f32>,
     /// Drains supplied in the last step.
-    supplied: Vec<Vec3>,
+    supplied: Vec<Supplied>,
 }
 
 /// A new node nearer than this share of a step length to another one is not made.
@@ -113,23 +122,20 @@ impl SystemGrowth {
     }
 
     /// Lets a candidate that has not been refused become a drain, unless one has been born too near it meanwhile.
-    pub fn offer_drain(&mut self, candidate: Vec3) -> bool {
-        let born = !self.drains.index().any_within(candidate, self.lengths.drain_birth);
-        if born {
-            self.drains.add(candidate);
-        }
-        born
+    pub fn offer_drain(&mut self, candidate: Vec3) -> Option<u32> {
+        let room = !self.drains.index().any_within(candidate, self.lengths.drain_birth);
+        room.then(|| self.drains.add(candidate))
     }
 
     /// Takes drains that the other system has supplied.
-    pub fn receive(&mut self, drains: &[Vec3]) {
-        for &drain in drains {
-            self.drains.add(drain);
+    pub fn receive(&mut self, supplied: &[Supplied]) {
+        for supplied in supplied {
+            self.drains.add(supplied.position);
         }
     }
 
     /// Drains supplied in the last step.
-    pub fn supplied(&self) -> &[Vec3] {
+    pub fn supplied(&self) -> &[Supplied] {
         &self.supplied
     }
 
@@ -198,7 +204,7 @@ impl SystemGrowth {
         let reach = self.lengths.kill * self.lengths.kill;
         for &Pull { drain, .. } in &self.pulls {
             if self.drains.hearing(drain).closest <= reach {
-                self.supplied.push(self.drains.position(drain));
+                self.supplied.push(Supplied { drain, position: self.drains.position(drain) });
                 self.drains.remove(drain);
             }
         }
@@ -221,9 +227,9 @@ impl SystemGrowth {
         }
     }
 
-    /// Size σ_t of the tissue, 1 at the start.
-    pub fn tissue_size(&self) -> f32 {
-        self.size
+    /// λ_t: what lengths are multiplied by at the present size of the tissue.
+    pub fn length_scale(&self) -> f32 {
+        self.size.recip()
     }
 }
 

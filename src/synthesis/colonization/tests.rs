@@ -74,7 +74,7 @@ fn pulled_by(drains: &[Vec3], change: impl Fn(&mut ColonizationSettings)) -> Gro
         ColonizationSettings { samples: 0, steps: 40, confine: false, ..ColonizationSettings::default() };
     change(&mut settings);
     let mut growth = growth(settings);
-    growth.systems[0].receive(drains);
+    drains.iter().for_each(|&drain| _ = growth.systems[0].drains.add(drain));
     while !growth.is_finished() {
         growth.step();
         assert_sound(&growth);

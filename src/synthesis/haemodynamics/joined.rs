@@ -115,6 +115,7 @@ pub struct Circulation {
     venous: Network,
     links: usize,
     conductance: f64,
+    passes: usize,
     sides: [Side; 2],
 }
 
@@ -133,22 +134,35 @@ impl Circulation {
 
     /// Joins two networks by links. A node may have several, and needs not be a terminal.
     ///
+    /// The veins' bed takes on the resistance of the arteries', which is that of each link.
+    ///
     /// # Errors
-    /// When a node is not of its network, or the arterial network's bed has no resistance, which is that of each link.
-    pub fn new(arterial: Network, venous: Network, links: &[BedLink]) -> Result<Self, FlowError> {
+    /// When a node is not of its network, or the arteries' bed has no resistance.
+    pub fn new(arterial: Network, mut venous: Network, links: &[BedLink]) -> Result<Self, FlowError> {
         let resistance = arterial.settings.bed.resistance.ok_or(FlowError::BedWithoutResistance)?;
-        let mut circulation = Self {
-            arterial,
-            venous,
-            links: links.len(),
-            conductance: 1.0 / resistance.pascal_seconds_per_cubic_metre(),
-            sides: [Side::new(links.iter().map(|link| link.arterial)), Side::new(links.iter().map(|link| link.venous))],
-        };
-        // Links conduct alike from both sides.
-        circulation.venous.settings.bed.resistance = Some(resistance);
-        circulation.arterial.set_links(links.iter().map(|link| link.arterial))?;
-        circulation.venous.set_links(links.iter().map(|link| link.venous))?;
+        venous.settings.bed.resistance = Some(resistance);
+        venous.set_beds();
+        let conductance = 1.0 / resistance.pascal_seconds_per_cubic_metre();
+        let mut circulation = Self { arterial, venous, links: 0, conductance, passes: 0, sides: Default::default() };
+        circulation.set_links(links)?;
         Ok(circulation)
+    }
+
+    /// Joins the networks by other links, as after growth: update both networks first.
+    ///
+    /// # Errors
+    /// When a node is not of its network. The links are as before, then.
+    pub fn set_links(&mut self, links: &[BedLink]) -> Result<(), FlowError> {
+        for link in links {
+            self.arterial.check(link.arterial)?;
+            self.venous.check(link.venous)?;
+        }
+        self.sides =
+            [Side::new(links.iter().map(|link| link.arterial)), Side::new(links.iter().map(|link| link.venous))];
+        self.arterial.set_links(links.iter().map(|link| link.arterial));
+        self.venous.set_links(links.iter().map(|link| link.venous));
+        self.links = links.len();
+        Ok(())
     }
 
     /// The arteries.
@@ -176,11 +190,15 @@ impl Circulation {
         self.links
     }
 
+    /// Passes of the conjugate gradients in the last solution, over all rounds for the open ends.
+    pub fn passes(&self) -> usize {
+        self.passes
+    }
+
     /// Gives the two networks back, apart again.
     pub fn into_networks(mut self) -> [Network; 2] {
         for network in [&mut self.arterial, &mut self.venous] {
-            // No node is refused where none is named.
-            let _ = network.set_links(std::iter::empty());
+            network.set_links(std::iter::empty());
         }
         [self.arterial, self.venous]
     }
@@ -194,6 +212,7 @@ impl Circulation {
     /// When one of the iterations did not converge.
     pub fn solve(&mut self) -> Result<(), FlowError> {
         self.share_bed_pressure();
+        self.passes = 0;
         let has_ends = [&self.arterial, &self.venous].iter().any(|network| !network.ends.all().is_empty());
         for network in [&mut self.arterial, &mut self.venous] {
             network.prepare_joined();
@@ -234,50 +253,67 @@ impl Circulation {
         self.balance()
     }
 
-    /// Solves both trees with their open ends as they are linearised: conjugate gradients on the arterial pressures.
+    /// Solves both trees with their open ends as they are linearised.
     fn balance(&mut self) -> Result<(), FlowError> {
+        let (mut pressures, residual, tolerated) = self.begin_from_last();
+        self.passes += self.descend(&mut pressures, residual, &tolerated)?;
         let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
-        let g = *conductance;
-        let (n, m) = (arteries.slots.len(), veins.slots.len());
-        let (mut into_arteries, mut into_veins) = (vec![0.0; n], vec![0.0; m]);
-        // From the last solution: each tree once, and the imbalance that is left at the arteries' nodes.
-        let before = veins.pressures(venous);
-        arteries.carry(veins, g, &before, &mut into_arteries);
+        let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
+        veins.carry(arteries, *conductance, &pressures, &mut into_veins);
+        veins.drive(venous, &into_veins);
+        arteries.carry(veins, *conductance, &veins.pressures(venous), &mut into_arteries);
         arteries.drive(arterial, &into_arteries);
-        let mut pressures = arteries.pressures(arterial);
-        veins.carry(arteries, g, &pressures, &mut into_veins);
+        Ok(())
+    }
+
+    /// Solves each tree once from the last solution. Returns the arterial pressures at the links, the imbalance left
+    /// there, and how much of it is tolerated.
+    fn begin_from_last(&mut self) -> (Vec<f64>, Vec<f64>, Tolerated) {
+        let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
+        let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
+        let before = veins.pressures(venous);
+        arteries.carry(veins, *conductance, &before, &mut into_arteries);
+        arteries.drive(arterial, &into_arteries);
+        let pressures = arteries.pressures(arterial);
+        veins.carry(arteries, *conductance, &pressures, &mut into_veins);
         veins.drive(venous, &into_veins);
         let after = veins.pressures(venous);
         let change: Vec<f64> = after.iter().zip(&before).map(|(a, b)| a - b).collect();
-        let mut residual = vec![0.0; n];
-        arteries.carry(veins, g, &change, &mut residual);
+        let mut residual = into_arteries;
+        arteries.carry(veins, *conductance, &change, &mut residual);
         arteries.excuse_roots(arterial, &mut residual);
         let tolerated = self.tolerated(&pressures, &after);
-        let Self { arterial, venous, sides: [arteries, veins], .. } = self;
+        (pressures, residual, tolerated)
+    }
 
-        let (mut z, mut carried) = (vec![0.0; n], vec![0.0; n]);
-        let mut answer = vec![0.0; m];
+    /// Conjugate gradients on the arterial pressures at the links. Returns the number of passes.
+    fn descend(
+        &mut self,
+        pressures: &mut [f64],
+        mut residual: Vec<f64>,
+        tolerated: &Tolerated,
+    ) -> Result<usize, FlowError> {
+        let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
+        let (mut z, mut carried) = (vec![0.0; residual.len()], vec![0.0; residual.len()]);
+        let (mut into_veins, mut answer) = (vec![0.0; veins.slots.len()], vec![0.0; veins.slots.len()]);
         arteries.respond(arterial, &residual, &mut z);
+        // `image` is the arteries' matrix times `direction`.
         let (mut direction, mut image) = (z.clone(), residual.clone());
         let mut product = dot(&residual, &z);
         let mut passes = 0;
         while largest(&residual) > tolerated.flow || largest(&z) > tolerated.pressure {
-            if passes == Self::MOST_PASSES {
+            veins.carry(arteries, *conductance, &direction, &mut into_veins);
+            veins.respond(venous, &into_veins, &mut answer);
+            arteries.carry(veins, *conductance, &answer, &mut carried);
+            arteries.excuse_roots(arterial, &mut carried);
+            let curvature: f64 = direction.iter().zip(image.iter().zip(&carried)).map(|(d, (i, c))| d * (i - c)).sum();
+            if passes == Self::MOST_PASSES || !(curvature > 0.0) {
                 let residual = Self::ACCURACY * largest(&residual) / tolerated.flow;
                 return Err(FlowError::NotConverged { what: "the flow through the bed", passes, residual });
             }
             passes += 1;
-            veins.carry(arteries, g, &direction, &mut into_veins);
-            veins.respond(venous, &into_veins, &mut answer);
-            arteries.carry(veins, g, &answer, &mut carried);
-            arteries.excuse_roots(arterial, &mut carried);
-            let curvature: f64 = direction.iter().zip(image.iter().zip(&carried)).map(|(d, (i, c))| d * (i - c)).sum();
-            if !(curvature > 0.0) {
-                let residual = Self::ACCURACY * largest(&residual) / tolerated.flow;
-                return Err(FlowError::NotConverged { what: "the flow through the bed", passes, residual });
-            }
             let step = product / curvature;
-            for at in 0..n {
+            for at in 0..pressures.len() {
                 pressures[at] += step * direction[at];
                 residual[at] -= step * (image[at] - carried[at]);
             }
@@ -285,16 +321,12 @@ impl Circulation {
             let next = dot(&residual, &z);
             let turn = next / product;
             product = next;
-            for at in 0..n {
+            for at in 0..pressures.len() {
                 direction[at] = z[at] + turn * direction[at];
                 image[at] = residual[at] + turn * image[at];
             }
         }
-        veins.carry(arteries, g, &pressures, &mut into_veins);
-        veins.drive(venous, &into_veins);
-        arteries.carry(veins, g, &veins.pressures(venous), &mut into_arteries);
-        arteries.drive(arterial, &into_arteries);
-        Ok(())
+        Ok(passes)
     }
 
     /// What is small enough: an imbalance relative to the largest flow in a link, and a correction relative to the
@@ -326,24 +358,23 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 impl Network {
-    /// Joins nodes to another network, in place of those that were: each as often as it is named.
-    pub(super) fn set_links(&mut self, nodes: impl Iterator<Item = NodeId> + Clone) -> Result<(), FlowError> {
-        for node in nodes.clone() {
-            self.check(node)?;
-        }
-        let none = vec![0; self.len()];
-        let before = std::mem::replace(&mut self.link_counts, none);
+    /// Joins nodes to another network, in place of those that were: each as often as it is named. All are there.
+    fn set_links(&mut self, nodes: impl Iterator<Item = NodeId>) {
+        self.link_counts.clear();
+        self.link_counts.resize(self.len(), 0);
         for node in nodes {
             self.link_counts[node.index()] += 1;
         }
+        self.set_beds();
+    }
+
+    /// Sets what all nodes drain into.
+    fn set_beds(&mut self) {
         for node in 0..self.len() {
-            if before.get(node).is_some_and(|&count| count > 0) || self.link_counts[node] > 0 {
-                self.set_bed(node);
-            }
+            self.set_bed(node);
         }
         self.sums_stale = true;
         self.ends.is_untraced = true;
-        Ok(())
     }
 
     /// Pressure outside above the bed's.

@@ -260,8 +260,8 @@ impl OpenEnds {
                 if end.flow > 0.0 { (end.stump.y * pressure - end.stump.s).max(0.0) } else { end.driven(pressure) };
             let tolerated = Self::ACCURACY * new + Self::NEGLIGIBLE * largest.max(new) + rounding * end.stump.y;
             let change = (new - end.flow).abs();
-            if change > 0.0 {
-                residual = residual.max(change / tolerated);
+            if !(change <= tolerated) {
+                residual = if change.is_nan() { f64::INFINITY } else { residual.max(change / tolerated) };
             }
             end.flow = if damped { 0.5 * (new + end.flow) } else { new };
         }

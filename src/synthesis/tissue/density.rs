@@ -1,7 +1,7 @@
 //! Density fields: where a tissue asks for more vessels and where for fewer, such as hypoxic regions.
 
 use super::{
-    Extent, Tissue, TissuePoint,
+    Extent, Piece, Tissue, TissuePoint,
     error::{TissueError, finite_point, positive},
     triangle::TriangleIndex,
 };
@@ -163,6 +163,16 @@ impl Tissue for DensityTissue {
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         let point = self.tissue.sample(rng)?;
         (rng.random::<f32>() < self.field.at(point)).then_some(point)
+    }
+
+    fn cut(&self, reach: f32, pieces: &mut Vec<Piece>) -> bool {
+        self.tissue.cut(reach, pieces)
+    }
+
+    fn point_of(&self, reach: f32, piece: [u32; 2], numbers: [f32; 3]) -> Option<Vec3> {
+        // Surfaces take two numbers of three.
+        let point = self.tissue.point_of(reach, piece, numbers)?;
+        (numbers[2] < self.field.at(point)).then_some(point)
     }
 
     fn entrance(&self) -> Option<Vec3> {

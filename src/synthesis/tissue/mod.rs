@@ -18,12 +18,12 @@
 
 pub mod bvh;
 pub mod density;
-mod draws;
 mod error;
 pub mod growth;
 pub mod mask;
 mod orientation;
 pub mod path;
+mod pieces;
 pub mod settings;
 pub mod shape;
 pub mod staged;
@@ -37,6 +37,7 @@ pub use error::TissueError;
 pub use growth::TissueGrowth;
 pub use mask::Mask;
 pub use path::GuidePath;
+pub use pieces::Piece;
 pub use settings::{Guide, TissueMode, TissueSettings};
 pub use shape::{Ball, Cuboid, Disc, Ellipsoid, Rectangle};
 pub use staged::Staged;
@@ -109,6 +110,21 @@ pub trait Tissue: Debug + Send + Sync {
     /// tissue knows a faster way to draw many.
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
         candidates.extend((0..count).filter_map(|_| self.sample(rng)));
+    }
+
+    /// Appends pieces that make up the whole tissue, none of them larger than a ball of radius `reach`, as far as that can be
+    /// arranged. `false`, and nothing appended, for a tissue that cannot be cut.
+    ///
+    /// A growth that knows which pieces are supplied draws its candidates from the others. Pieces of equal measure are drawn
+    /// from faster.
+    fn cut(&self, _reach: f32, _pieces: &mut Vec<Piece>) -> bool {
+        false
+    }
+
+    /// The point that three even numbers from 0 to below 1 choose from a piece that [`cut`](Self::cut) gave for this `reach`:
+    /// uniformly, as [`sample`](Self::sample) would among those of its points that fall into the piece. `None` as there.
+    fn point_of(&self, _reach: f32, _piece: [u32; 2], _numbers: [f32; 3]) -> Option<Vec3> {
+        None
     }
 
     /// Where vessels enter the tissue of themselves, if there is such a place: the beginning of a guide.

@@ -2,13 +2,14 @@
 //! solids.
 
 use super::{
-    Extent, Tissue, TissuePoint, draws,
+    Extent, Piece, Tissue, TissuePoint,
     error::{TissueError, finite_point, positive},
+    pieces,
 };
-use crate::synthesis::rng::VesselRng;
-use bevy_math::{DVec3, Vec2, Vec3, bounding::Aabb3d};
+use crate::synthesis::{draws, rng::VesselRng};
+use bevy_math::{DVec3, UVec2, Vec2, Vec3, bounding::Aabb3d, ops};
 use rand::RngExt;
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_1_SQRT_2, PI};
 
 /// Rounding that a shape's own points are forgiven, relative to its size and distance from the origin.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
@@ -140,6 +141,45 @@ impl Tissue for Disc {
             (point.length_squared() <= 1.0).then(|| self.at(point * self.radius))
         });
     }
+
+    /// Rings of equal width, from the middle outwards, of 3, 9, 15, … sectors: all of the same area.
+    fn cut(&self, reach: f32, pieces: &mut Vec<Piece>) -> bool {
+        let rings = pieces::parts(self.radius, 1.15 * reach);
+        let width = self.radius / rings as f32;
+        let measure = PI * width * width / SECTORS as f32;
+        for ring in 0..rings {
+            let sectors = SECTORS * (2 * ring + 1);
+            let half = PI / sectors as f32;
+            let (inner, outer) = (ring as f32 * width, (ring + 1) as f32 * width);
+            // Halfway between inner and outer arc; the corners of the outer one are the farthest.
+            let middle = 0.5 * (inner * ops::cos(half) + outer);
+            let corner = Vec2::new(outer * ops::cos(half) - middle, outer * ops::sin(half)).length();
+            let inner_corner = Vec2::new(inner * ops::cos(half) - middle, inner * ops::sin(half)).length();
+            let reach = corner.max(inner_corner).max(outer - middle).max(middle - inner);
+            for sector in 0..sectors {
+                let center = self.at(middle * direction(half * (2 * sector + 1) as f32));
+                pieces.push(Piece { center, reach, measure, id: [ring, sector] });
+            }
+        }
+        true
+    }
+
+    fn point_of(&self, reach: f32, [ring, sector]: [u32; 2], [outward, around, _]: [f32; 3]) -> Option<Vec3> {
+        let rings = pieces::parts(self.radius, 1.15 * reach);
+        let (inner, outer) = (ring as f32, (ring + 1) as f32);
+        let distance = (inner * inner + (outer * outer - inner * inner) * outward).sqrt() * self.radius / rings as f32;
+        let angle = (sector as f32 + around) * (2.0 * PI / (SECTORS * (2 * ring + 1)) as f32);
+        Some(self.at(distance * direction(angle)))
+    }
+}
+
+/// Sectors in the innermost ring of a disc that is cut.
+const SECTORS: u32 = 3;
+
+/// The unit vector at an angle from the first axis, in radians.
+fn direction(angle: f32) -> Vec2 {
+    let (sin, cos) = ops::sin_cos(angle);
+    Vec2::new(cos, sin)
 }
 
 /// A flat rectangle.
@@ -194,6 +234,11 @@ impl Rectangle {
         self.center + self.axes[0] * local.x + self.axes[1] * local.y
     }
 
+    /// Number of pieces along each side.
+    fn parts(&self, reach: f32) -> UVec2 {
+        UVec2::from((2.0 * self.half).to_array().map(|length| pieces::parts(length, 2.0 * FRAC_1_SQRT_2 * reach)))
+    }
+
     fn nearest(&self, point: Vec3) -> Vec3 {
         let offset = point - self.center;
         self.at(Vec2::new(offset.dot(self.axes[0]), offset.dot(self.axes[1])).clamp(-self.half, self.half))
@@ -220,6 +265,23 @@ impl Tissue for Rectangle {
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         Some(self.at(self.half * Vec2::new(signed(rng), signed(rng))))
+    }
+
+    fn cut(&self, reach: f32, pieces: &mut Vec<Piece>) -> bool {
+        let counts = self.parts(reach);
+        let part = 2.0 * self.half / counts.as_vec2();
+        for y in 0..counts.y {
+            for x in 0..counts.x {
+                let center = self.at((UVec2::new(x, y).as_vec2() + 0.5) * part - self.half);
+                pieces.push(Piece { center, reach: 0.5 * part.length(), measure: part.x * part.y, id: [x, y] });
+            }
+        }
+        true
+    }
+
+    fn point_of(&self, reach: f32, piece: [u32; 2], [x, y, _]: [f32; 3]) -> Option<Vec3> {
+        let part = 2.0 * self.half / self.parts(reach).as_vec2();
+        Some(self.at((UVec2::from(piece).as_vec2() + Vec2::new(x, y)) * part - self.half))
     }
 }
 

@@ -1,11 +1,12 @@
 //! The surface of an organ's mesh as a tissue.
 
 use super::{
-    Extent, Tissue, TissuePoint, draws,
+    Extent, Piece, Tissue, TissuePoint,
     error::TissueError,
+    pieces,
     triangle::{SurfacePoint, TriangleIndex},
 };
-use crate::synthesis::{mesh::TriangleMesh, rng::VesselRng};
+use crate::synthesis::{alias::AliasTable, draws, mesh::TriangleMesh, rng::VesselRng};
 use bevy_math::{Vec3, bounding::Aabb3d};
 use rand::RngExt;
 
@@ -14,8 +15,7 @@ pub const SURFACE_TOLERANCE: f32 = 1.0e-5;
 
 /// The triangles of a mesh, sampled evenly by area.
 ///
-/// Points are drawn in constant time (Vose, "A linear algorithm for generating random numbers with a given
-/// distribution", 1991) and projected through an index over the triangles.
+/// Points are drawn in constant time and projected through an index over the triangles.
 #[derive(Clone, Debug)]
 pub struct MeshSurface {
     mesh: TriangleMesh,
@@ -24,19 +24,10 @@ pub struct MeshSurface {
     normals: Vec<Vec3>,
     /// −1 where the mesh as a whole faces inwards.
     facing: f32,
-    picks: Vec<Pick>,
+    picks: AliasTable,
     bounds: Aabb3d,
     area: f32,
     tolerance: f32,
-}
-
-/// An entry of the alias table.
-#[derive(Clone, Copy, Debug)]
-struct Pick {
-    /// Probability of staying with this triangle.
-    keep: f32,
-    /// The triangle to take otherwise.
-    other: u32,
 }
 
 impl MeshSurface {
@@ -59,7 +50,7 @@ impl MeshSurface {
             index: TriangleIndex::new(&mesh),
             normals,
             facing,
-            picks: alias_table(&areas),
+            picks: AliasTable::new(areas.iter().copied()),
             area: areas.iter().sum::<f64>() as f32,
             tolerance: (bounds.max - bounds.min).max_element() * SURFACE_TOLERANCE,
             bounds,
@@ -92,11 +83,22 @@ impl MeshSurface {
 }
 
 impl MeshSurface {
+    /// Number of parts into which a triangle's sides are cut so that none of them reaches further than `reach`.
+    fn parts(&self, triangle: usize, reach: f32) -> u32 {
+        let [a, b, c] = self.mesh.corners(triangle);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        // A triangle reaches two thirds of its median from its centre at the most, and that less than this share of a side.
+        pieces::parts(longest, 1.5 * reach)
+    }
+
     /// The point that four even numbers choose: a slot of the table, whether to stay with it, and two in the triangle.
-    fn pick(&self, slot: u32, keep: f32, [mut v, mut w]: [f32; 2]) -> Vec3 {
-        let pick = self.picks[slot as usize];
-        let triangle = if keep < pick.keep { slot } else { pick.other };
-        let [a, b, c] = self.mesh.corners(triangle as usize);
+    fn pick(&self, slot: u32, keep: f32, numbers: [f32; 2]) -> Vec3 {
+        self.point_in(self.picks.pick(slot, keep) as usize, numbers)
+    }
+
+    /// The point of a triangle that two even numbers choose.
+    fn point_in(&self, triangle: usize, [mut v, mut w]: [f32; 2]) -> Vec3 {
+        let [a, b, c] = self.mesh.corners(triangle);
         // Evenly over the parallelogram, its far half folded back.
         if v + w > 1.0 {
             (v, w) = (1.0 - v, 1.0 - w);
@@ -127,7 +129,7 @@ impl Tissue for MeshSurface {
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
-        if self.picks.is_empty() {
+        if self.picks.len() == 0 {
             return None;
         }
         let slot = rng.random_range(0..self.picks.len() as u32);
@@ -142,35 +144,48 @@ impl Tissue for MeshSurface {
             });
         }
     }
+
+    /// Triangles whose sides are longer than `reach` allows are cut into k² equal ones, by lines along their sides.
+    fn cut(&self, reach: f32, pieces: &mut Vec<Piece>) -> bool {
+        for triangle in (0..self.mesh.triangles().len()).filter(|&triangle| !self.mesh.is_degenerate(triangle)) {
+            let [a, b, c] = self.mesh.corners(triangle);
+            let parts = self.parts(triangle, reach);
+            let measure = self.mesh.triangle_area(triangle) as f32 / (parts * parts) as f32;
+            for part in 0..parts * parts {
+                let corners = small_triangle(part, parts).map(|[v, w]| a + (b - a) * v + (c - a) * w);
+                let center = (corners[0] + corners[1] + corners[2]) / 3.0;
+                let reach = corners.iter().map(|corner| corner.distance(center)).fold(0.0, f32::max);
+                pieces.push(Piece { center, reach, measure, id: [triangle as u32, part] });
+            }
+        }
+        true
+    }
+
+    fn point_of(&self, reach: f32, [triangle, part]: [u32; 2], [v, w, _]: [f32; 3]) -> Option<Vec3> {
+        let [a, b, c] = self.mesh.corners(triangle as usize);
+        let [p, q, r] = small_triangle(part, self.parts(triangle as usize, reach));
+        let (v, w) = if v + w > 1.0 { (1.0 - v, 1.0 - w) } else { (v, w) };
+        let [v, w] = [0, 1].map(|axis| p[axis] + (q[axis] - p[axis]) * v + (r[axis] - p[axis]) * w);
+        Some(a + (b - a) * v + (c - a) * w)
+    }
 }
 
-/// Vose's table for drawing an index with a probability in proportion to its weight. Empty where no weight is above 0.
-fn alias_table(weights: &[f64]) -> Vec<Pick> {
-    let total: f64 = weights.iter().sum();
-    if total <= 0.0 {
-        return Vec::new();
+/// Corners of one of the n² equal parts of a triangle, as shares of the ways from its first corner to the others.
+///
+/// Row by row from the first side: row i has 2(n − i) − 1 parts, by turns upright and upside down.
+fn small_triangle(part: u32, parts: u32) -> [[f32; 2]; 3] {
+    let (mut row, mut left) = (0, part);
+    while left >= 2 * (parts - row) - 1 {
+        left -= 2 * (parts - row) - 1;
+        row += 1;
     }
-    let mut shares: Vec<f64> = weights.iter().map(|weight| weight / total * weights.len() as f64).collect();
-    let (mut small, mut large): (Vec<u32>, Vec<u32>) =
-        (0..weights.len() as u32).partition(|&index| shares[index as usize] < 1.0);
-    let mut table = vec![Pick { keep: 1.0, other: 0 }; weights.len()];
-    let largest = (0..weights.len()).fold(0, |best, i| if weights[i] > weights[best] { i } else { best });
-    while let Some(under) = small.pop() {
-        // What rounding leaves over on either side counts as exactly 1, unless it had no weight at all.
-        let Some(&over) = large.last() else {
-            if weights[under as usize] == 0.0 {
-                table[under as usize] = Pick { keep: 0.0, other: largest as u32 };
-            }
-            continue;
-        };
-        table[under as usize] = Pick { keep: shares[under as usize] as f32, other: over };
-        shares[over as usize] -= 1.0 - shares[under as usize];
-        if shares[over as usize] < 1.0 {
-            large.pop();
-            small.push(over);
-        }
+    let at = |column: u32, row: u32| [column as f32 / parts as f32, row as f32 / parts as f32];
+    let column = left / 2;
+    if left % 2 == 0 {
+        [at(column, row), at(column + 1, row), at(column, row + 1)]
+    } else {
+        [at(column + 1, row + 1), at(column, row + 1), at(column + 1, row)]
     }
-    table
 }
 
 #[cfg(test)]
@@ -178,18 +193,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_alias_table_gives_every_weight_its_share() {
-        let weights = [0.0, 3.0, 0.0, 1.0, 0.5, 7.5, 1e-12];
-        let table = alias_table(&weights);
-        let mut shares = [0.0; 7];
-        for (index, pick) in table.iter().enumerate() {
-            shares[index] += f64::from(pick.keep) / 7.0;
-            shares[pick.other as usize] += f64::from(1.0 - pick.keep) / 7.0;
+    fn small_triangles_fill_the_large_one() {
+        for parts in [1, 2, 5] {
+            let mut hits = 0;
+            for probe in 0..200 {
+                let (v, w) = (probe as f32 * 0.618_034 % 1.0, probe as f32 * 0.754_878 % 1.0);
+                let inside = |part: u32| {
+                    let [p, q, r] = small_triangle(part, parts).map(bevy_math::Vec2::from);
+                    let point = bevy_math::Vec2::new(v, w);
+                    let side = |a: bevy_math::Vec2, b: bevy_math::Vec2| (b - a).perp_dot(point - a);
+                    side(p, q) >= 0.0 && side(q, r) >= 0.0 && side(r, p) >= 0.0
+                };
+                let found = (0..parts * parts).filter(|&part| inside(part)).count();
+                assert_eq!(found, usize::from(v + w < 1.0), "{parts} parts, ({v}, {w})");
+                hits += found;
+            }
+            assert!(hits > 50);
         }
-        for (share, weight) in shares.iter().zip(weights) {
-            assert!((share - weight / 12.0).abs() < 1e-6, "{shares:?}");
-        }
-        assert!(alias_table(&[0.0, 0.0]).is_empty());
-        assert!(alias_table(&[]).is_empty());
     }
 }

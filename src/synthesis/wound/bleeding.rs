@@ -242,8 +242,28 @@ impl Bleeding {
             return Err(FlowError::Step { seconds });
         }
         self.changes.clear();
+        let open = network.open_ends();
+        if self.ends.len() != open.len() || !self.ends.iter().zip(open).all(|(end, open)| end.is_of(open)) {
+            self.take_over(open);
+        }
+        for end in &mut self.ends {
+            end.lost_in_step = 0.0;
+            end.bled = end.state == EndState::Bleeding;
+        }
+        let longest = match network.settings().root {
+            RootPressure::Constant(_) => f64::from(self.settings.longest_step),
+            RootPressure::Pulsatile(pulse) => {
+                f64::from(self.settings.longest_step).min(pulse.period() / BleedingSettings::SAMPLES_PER_BEAT)
+            }
+        };
+        // A hair more than a whole number of parts is a rounding error.
+        Ok(((seconds / longest * (1.0 - 1e-9)).ceil() as u32).max(1))
+    }
+
+    /// Takes over new ends and drops closed ones; both lists are in the order of their segments.
+    fn take_over(&mut self, open: &[OpenEnd]) {
         let mut before = std::mem::take(&mut self.ends).into_iter().peekable();
-        for end in network.open_ends() {
+        for end in open {
             while let Some(gone) = before.next_if(|old| old.key() < (end.node, end.side)) {
                 self.close(&gone);
             }
@@ -257,18 +277,6 @@ impl Bleeding {
             }
         }
         before.for_each(|gone| self.close(&gone));
-        for end in &mut self.ends {
-            end.lost_in_step = 0.0;
-            end.bled = end.state == EndState::Bleeding;
-        }
-        let longest = match network.settings().root {
-            RootPressure::Constant(_) => f64::from(self.settings.longest_step),
-            RootPressure::Pulsatile(pulse) => {
-                f64::from(self.settings.longest_step).min(pulse.period() / BleedingSettings::SAMPLES_PER_BEAT)
-            }
-        };
-        // A hair more than a whole number of parts is a rounding error.
-        Ok(((seconds / longest * (1.0 - 1e-9)).ceil() as u32).max(1))
     }
 
     fn close(&mut self, end: &BleedingEnd) {

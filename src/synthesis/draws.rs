@@ -8,7 +8,7 @@ use rand::Rng;
 const RUN: usize = 192;
 
 /// Appends `count` points, each made from `N` random words. Words from which `point` makes none are replaced by others.
-pub(super) fn draw<const N: usize>(
+pub(crate) fn draw<const N: usize>(
     rng: &mut VesselRng,
     count: u32,
     points: &mut Vec<Vec3>,
@@ -32,22 +32,42 @@ pub(super) fn draw<const N: usize>(
     }
 }
 
+/// Calls `each` for `count` lots of `N` random words.
+pub(crate) fn each<const N: usize>(rng: &mut VesselRng, count: u32, mut each: impl FnMut([u32; N])) {
+    let mut words = [0u32; RUN];
+    let mut left = count as usize;
+    while left > 0 {
+        rng.fill_bytes(bytemuck::cast_slice_mut(&mut words));
+        let lots = words.as_chunks::<N>().0;
+        lots.iter().take(left).for_each(|lot| each(lot.map(u32::from_le)));
+        left -= left.min(lots.len());
+    }
+}
+
+/// How many of `count` even numbers lie below `share`: a binomial variate, to within 2⁻³² of its probability.
+pub(crate) fn count_below(rng: &mut VesselRng, count: u32, share: f64) -> u32 {
+    let limit = (share * f64::from(u32::MAX)) as u32;
+    let mut below = 0;
+    each(rng, count, |[word]| below += u32::from(word < limit));
+    below
+}
+
 /// A number from −1 to 1.
 #[inline]
-pub(super) fn signed(word: u32) -> f32 {
+pub(crate) fn signed(word: u32) -> f32 {
     word as i32 as f32 * (1.0 / (1u32 << 31) as f32)
 }
 
 /// A number from 0 to below 1.
 #[inline]
-pub(super) fn unit(word: u32) -> f32 {
+pub(crate) fn unit(word: u32) -> f32 {
     (word >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
 }
 
 /// A number from 0 to below `count`, by the high half of a product: no two results get shares of the 2³² words that differ
 /// by more than one.
 #[inline]
-pub(super) fn below(word: u32, count: u32) -> u32 {
+pub(crate) fn below(word: u32, count: u32) -> u32 {
     ((u64::from(word) * u64::from(count)) >> 32) as u32
 }
 
