@@ -7,8 +7,8 @@
 //! 2. [`roots`] say where vessels enter it.
 //! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`].
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
-//! 5. [`wound`] is where blades sever them, [`haemodynamics`] lets blood flow through them and out of wounds, and
-//!    [`binding`] moves them with an organ that deforms.
+//! 5. [`haemodynamics`] lets blood flow through them, [`wound`] cuts them and lets it out, [`binding`] moves them with an
+//!    organ that deforms.
 //!
 //! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`rng`] hands out
 //! random streams, [`point_grid`] finds points by distance, [`units`] turn lengths into metres.
