@@ -3,6 +3,7 @@
 mod common;
 mod crossings;
 mod degenerate;
+mod flow;
 mod indexed;
 mod ledger;
 mod random_actions;

@@ -4,6 +4,8 @@
 //! some of them without length. A clamp, tie or seal lies on a piece. One on the very tip of a piece belongs to that
 //! piece; where two tips touch, to the one towards the root.
 
+use crate::synthesis::haemodynamics::EndSide;
+
 /// How much of the piece it belongs to an end draws back by at most. Below one half, so that a piece between two cuts
 /// never vanishes.
 pub(super) const MOST_RETRACTION: f32 = 0.45;
@@ -43,16 +45,6 @@ pub(super) struct Closure {
     pub from: f32,
     pub to: f32,
     pub kind: ClosureKind,
-}
-
-/// Which end of a gap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
-pub enum EndSide {
-    /// The end towards the root. Its lumen faces the tips.
-    Proximal,
-    /// The end towards the tips. Its lumen faces the root.
-    Distal,
 }
 
 /// An end as it lies on its segment.

@@ -1,8 +1,8 @@
-//! Cuts, clamps, ties and seals on a vessel tree.
+//! Cuts, clamps, ties and seals on a vessel tree; how it bleeds and stops, and what tissue it leaves without blood.
 //!
 //! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and a [`SegmentIndex`]. Out: a
 //! [`WoundReport`] for each action, with every end that it opened or closed; and at any time [`Wounds`], from which the
-//! flow learns how far blood comes ([`Blockage`]) and a renderer what is left to draw ([`write_stumps`]).
+//! flow learns how far blood comes ([`Wounds::interruptions`]) and a renderer what is left to draw ([`write_stumps`]).
 //!
 //! The tree itself is never changed: wounds are laid over it, each at a share of a segment. So growth, which only
 //! appends, and deformation, which moves nodes, go on beneath them, and undo is exact.
@@ -58,13 +58,13 @@ mod segment_index;
 mod stumps;
 mod wounds;
 
+pub use crate::synthesis::haemodynamics::EndSide;
 pub use blade::{Blade, BladeError};
 pub use bleeding::{Bleeding, BleedingChange, BleedingEnd, BleedingSettings, EndState};
 pub use blood_volume::{BloodVolume, BloodVolumeSettings};
 pub use clotting::Clotting;
 pub use crossing::{Severed, severed};
 pub use error::WoundError;
-pub use injury::EndSide;
 pub use ischaemia::{Supply, TissueSupply};
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
 pub use retraction::Retraction;

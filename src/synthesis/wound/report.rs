@@ -1,6 +1,6 @@
 //! What actions are known by, and what they report.
 
-use super::injury::EndSide;
+use crate::synthesis::haemodynamics::EndSide;
 use crate::synthesis::tree::{NodeId, Place};
 use bevy_math::Vec3;
 

@@ -7,6 +7,7 @@
 use super::crossing::segment;
 use super::injury::{Gap, Injury};
 use super::{EndId, Wounds};
+use crate::synthesis::haemodynamics::{Interruption, Outlet};
 use crate::synthesis::instances::{SegmentColors, SegmentInstance, segment_instance};
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
 use bevy_math::Vec3;
@@ -51,6 +52,15 @@ pub struct Blockage {
     pub proximal: Option<EndId>,
     /// The open end at `last`; `None` where the lumen is closed.
     pub distal: Option<EndId>,
+}
+
+impl Blockage {
+    /// The same as the flow has it, on a vessel of a radius in tissue lengths.
+    pub fn interruption(&self, radius: f32) -> Interruption {
+        let outlet = |end: Option<EndId>| end.map(|_| Outlet { radius });
+        let Self { first, last, .. } = *self;
+        Interruption { first, last, proximal: outlet(self.proximal), distal: outlet(self.distal) }
+    }
 }
 
 /// How far the round end that a segment is drawn with reaches beyond its end, in radii.
@@ -101,6 +111,16 @@ impl Wounds {
         let (last, distal) = injury.reach_from_node();
         let id = |end: u32| self.end_id(end);
         Blockage { node, first, last, proximal: proximal.map(id), distal: distal.map(id) }
+    }
+
+    /// The injured segments as gaps for the flow, in the order of their nodes: what
+    /// [`Network::set_interruptions`](crate::synthesis::haemodynamics::Network::set_interruptions) takes. A hole has the
+    /// radius of its vessel. Segments that the tree doesn't have are left out.
+    pub fn interruptions(&self, tree: &VesselTree) -> impl Iterator<Item = (NodeId, Interruption)> {
+        self.blockages().filter_map(|blockage| {
+            let radius = *tree.radii().get(blockage.node.index())?;
+            Some((blockage.node, blockage.interruption(radius)))
+        })
     }
 
     /// The place where a vessel still is that is nearest to a point, and its distance: what was clicked, or what an

@@ -2,8 +2,9 @@
 
 use super::blade::Shape;
 use super::crossing::{Severed, segment, severed, within};
-use super::injury::{ClosureKind, End, EndSide, Injury, Removal};
+use super::injury::{ClosureKind, End, Injury, Removal};
 use super::{Blade, BladeError, ClampId, EndId, Retraction, SeveredEnd, WoundError, WoundReport};
+use crate::synthesis::haemodynamics::EndSide;
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
 use bevy_math::Vec3;
 use std::collections::BTreeMap;
