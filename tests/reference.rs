@@ -17,6 +17,8 @@ use bevy_vessels::synthesis::{
 use std::sync::Arc;
 
 const SEEDS: u64 = 5;
+/// Seeds of the finer disc. Now and then its veins stall, as do those of the paper's program: five seeds say little.
+const FINE_DISC_SEEDS: u64 = 40;
 
 /// Means over seeds of what the reference measures.
 #[derive(Debug, Default)]
@@ -73,13 +75,13 @@ fn grown(tissue: &Arc<dyn Tissue>, preset: &Preset, settings: &ColonizationSetti
 }
 
 /// Means over seeds, arterial and venous.
-fn measure(tissue: &Arc<dyn Tissue>, preset: &Preset, settings: &ColonizationSettings) -> [Measures; 2] {
+fn measure(tissue: &Arc<dyn Tissue>, preset: &Preset, settings: &ColonizationSettings, seeds: u64) -> [Measures; 2] {
     let mut measures = [Measures::default(), Measures::default()];
-    for seed in 0..SEEDS {
+    for seed in 0..seeds {
         let growth = grown(tissue, preset, settings, seed);
         for system in System::ALL {
             if !growth.tree(system).is_empty() {
-                measures[system.index()].add(&growth, system, 1.0 / SEEDS as f64);
+                measures[system.index()].add(&growth, system, 1.0 / seeds as f64);
             }
         }
     }
@@ -139,7 +141,7 @@ const BALL_ARTERIES: Measures = Measures {
 #[test]
 fn the_disc_has_the_reference_statistics() {
     let preset = PresetName::ReferenceDisc.load();
-    let [arteries, veins] = measure(&disc(), &preset, &preset.settings);
+    let [arteries, veins] = measure(&disc(), &preset, &preset.settings, SEEDS);
     assert_within_ten_percent("disc, arteries", &arteries, &DISC_ARTERIES);
     assert_within_ten_percent("disc, veins", &veins, &DISC_VEINS);
 }
@@ -147,7 +149,7 @@ fn the_disc_has_the_reference_statistics() {
 #[test]
 fn the_finer_disc_has_the_reference_statistics() {
     let preset = PresetName::ReferenceDisc.load();
-    let [arteries, veins] = measure(&disc(), &preset, &preset.settings.clone().scaled(0.75));
+    let [arteries, veins] = measure(&disc(), &preset, &preset.settings.clone().scaled(0.75), FINE_DISC_SEEDS);
     assert_within_ten_percent("disc ×0.75, arteries", &arteries, &FINE_DISC_ARTERIES);
     assert_within_ten_percent("disc ×0.75, veins", &veins, &FINE_DISC_VEINS);
 }
@@ -155,7 +157,7 @@ fn the_finer_disc_has_the_reference_statistics() {
 #[test]
 fn the_ball_has_the_reference_statistics() {
     let preset = PresetName::ReferenceBall.load();
-    let [arteries, _] = measure(&ball(), &preset, &preset.settings);
+    let [arteries, _] = measure(&ball(), &preset, &preset.settings, SEEDS);
     assert_within_ten_percent("ball, arteries", &arteries, &BALL_ARTERIES);
 }
 
@@ -179,7 +181,7 @@ fn variation(change: impl Fn(&mut ColonizationSettings)) -> Measures {
     let preset = PresetName::ReferenceDisc.load();
     let mut settings = preset.settings.clone();
     change(&mut settings);
-    let [arteries, _] = measure(&disc(), &preset, &settings);
+    let [arteries, _] = measure(&disc(), &preset, &settings, SEEDS);
     arteries
 }
 

@@ -22,7 +22,7 @@ const COARSE: f32 = 0.6;
 /// By how much λ shrinks from one look over the pieces to the next.
 const PATIENCE: f32 = 0.85;
 /// Pieces of more than this share of the radius are not worth their while.
-const USELESS: f32 = 0.6;
+const USELESS: f32 = 0.45;
 /// Share of the listed pieces that must be free; else they are listed anew.
 const ENOUGH: f64 = 0.5;
 /// Fewest samples in a whole growth for every piece: more pieces than that cost more than they save.

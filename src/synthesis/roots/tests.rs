@@ -116,8 +116,10 @@ fn compact_tissues_have_one_root_and_long_ones_several_within_reach() -> Result<
         assert!((tissue.extent().equivalent_diameter() - size).abs() < 1e-3);
         for seed in 0..20 {
             let [arteries, veins] = Roots::default().resolve(&*tissue, &settings, seed)?;
-            // Two ways of 1.8 a root; no two are nearer than the way from one of several.
-            assert!((3..=8).contains(&arteries.len()), "seed {seed}: {} roots", arteries.len());
+            // At the least one for two ways of 1.8. At the most as many as fit in with 0.6 of a way between them, which
+            // from sample to sample goes in zigzag, by a fifth longer.
+            let most = 1 + (8.0 * 1.2 / (0.6 * way)) as usize;
+            assert!((3..=most).contains(&arteries.len()), "seed {seed}: {} roots of {most}", arteries.len());
             assert_eq!(arteries.len(), veins.len());
             assert_eq!(missed(&*tissue, &arteries, way), 0, "seed {seed}");
         }

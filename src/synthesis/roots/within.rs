@@ -25,7 +25,7 @@ const LINKS: NonZeroUsize = NonZeroUsize::new(12).expect("12 is not zero");
 const GAP: f32 = 0.15;
 /// Points of a link that must be in the tissue, or as near.
 const BETWEEN: u32 = 5;
-/// Cosine of the angle to the normals from which on a link leaves one wall for another.
+/// Cosine of the angle between a normal and the other's opposite from which on two walls face each other.
 const FACING: f32 = 0.5;
 /// Way from one of several roots, as a share of that from an only one: what needs several is narrow, and in a narrow tissue
 /// vessels come forward more slowly.
@@ -146,9 +146,9 @@ fn nearest_pairs(samples: &[TissuePoint]) -> Vec<(u32, u32)> {
 /// Whether the tissue goes on between two of its points, rather than leaving a gap that vessels would have to cross.
 fn leads_through(tissue: &dyn Tissue, [from, to]: [TissuePoint; 2]) -> bool {
     let way = to.position - from.position;
-    // Two walls that face each other, such as those of two folds, which may be no further apart than samples are.
-    let steep = FACING * way.length();
-    if from.normal.dot(way) > steep && to.normal.dot(-way) > steep {
+    // Two walls that face each other, such as those of two folds, may be nearer than samples are.
+    let opposite = from.normal.dot(to.normal) < -FACING;
+    if opposite && from.normal.dot(way) > 0.0 && to.normal.dot(way) < 0.0 {
         return false;
     }
     let allowed = GAP * way.length();

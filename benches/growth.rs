@@ -1,0 +1,159 @@
+//! How fast vessels grow, and why the index over nodes is a grid.
+//!
+//! `cargo bench --bench growth` runs everything; a part of a name after `--` chooses, such as `cargo bench --bench growth --
+//! reference`. Times of a shared machine are loose: compare lines of one run.
+
+use bevy_math::{Vec3, bounding::Aabb3d};
+use bevy_vessels::synthesis::{
+    colonization::{ColonizationSettings, Growth},
+    io::read_mesh,
+    point_grid::PointGrid,
+    preset::PresetName,
+    rng::Stream,
+    roots::{RootPlacement, Roots},
+    tissue::{Ball, Disc, MeshSurface, Tissue},
+    tree::System,
+};
+use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use std::{hint::black_box, path::Path, sync::Arc};
+
+/// What grows: a tissue, settings that fit it, and roots.
+struct Case {
+    tissue: Arc<dyn Tissue>,
+    settings: ColonizationSettings,
+    roots: Roots,
+}
+
+impl Case {
+    fn new(tissue: Arc<dyn Tissue>, preset: PresetName) -> Self {
+        let preset = preset.load();
+        let settings = if preset.fit { preset.settings.fit(tissue.extent()) } else { preset.settings };
+        let roots = Roots { arterial: preset.arterial_roots, venous: preset.venous_roots, given: [None, None] };
+        Self { tissue, settings, roots }
+    }
+
+    fn disc(preset: PresetName) -> Self {
+        Self::new(Arc::new(Disc::flat(0.5).expect("a disc of radius 0.5")), preset)
+    }
+
+    fn ball() -> Self {
+        Self::new(Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball of radius 0.5")), PresetName::ReferenceBall)
+    }
+
+    /// Other numbers of samples and steps, and shorter lengths to match.
+    fn sized(mut self, samples: u32, steps: u32, lengths: f32) -> Self {
+        self.settings = ColonizationSettings { samples, steps, ..self.settings.scaled(lengths) };
+        self
+    }
+
+    fn arteries_only(mut self) -> Self {
+        self.roots.venous = RootPlacement::None;
+        self
+    }
+
+    fn growth(&self) -> Growth {
+        Growth::new(Arc::clone(&self.tissue), self.settings.clone(), &self.roots, 1).expect("valid settings")
+    }
+}
+
+fn nodes(growth: &Growth) -> usize {
+    System::ALL.map(|system| growth.tree(system).len()).iter().sum()
+}
+
+/// The cases that the paper's own program was measured on, each with and without a second thread.
+fn reference(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("reference");
+    for (name, case) in [
+        ("disc, arteries and veins", Case::disc(PresetName::ReferenceDisc)),
+        ("disc, arteries and veins, lengths x 0.75", Case::disc(PresetName::ReferenceDisc).sized(1000, 100, 0.75)),
+        ("ball, arteries", Case::ball().arteries_only()),
+        ("ball, arteries and veins", Case::ball()),
+        ("paper's settings on the disc", Case::disc(PresetName::Paper)),
+    ] {
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            group.bench_function(BenchmarkId::new(name, format!("{threads} threads")), |bencher| {
+                pool.install(|| bencher.iter_batched_ref(|| case.growth(), Growth::run, BatchSize::LargeInput));
+            });
+        }
+    }
+    group.finish();
+}
+
+/// From ten thousand nodes to a million. Nodes a second are what should stay.
+fn scale(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("scale");
+    group.sample_size(10);
+    let mut cases = vec![
+        ("ball, 10k", Case::ball().sized(700, 90, 1.0)),
+        ("ball, 100k", Case::ball().sized(4000, 150, 1.1 / 1.5)),
+        ("ball, 1M", Case::ball().sized(22_000, 260, 0.8 / 1.5)),
+    ];
+    let colon = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/organs/colon_vhf.glb");
+    match read_mesh(&colon).map(MeshSurface::new) {
+        Ok(Ok(colon)) => {
+            let colon: Arc<dyn Tissue> = Arc::new(colon);
+            let case = || Case::new(Arc::clone(&colon), PresetName::Colon);
+            cases.push(("colon, 50k", case()));
+            cases.push(("colon, 200k", case().sized(10_000, 240, 0.45)));
+        }
+        _ => println!("no real colon at {}; its cases are left out", colon.display()),
+    }
+    for (name, case) in cases {
+        let mut grown = case.growth();
+        grown.run();
+        group.throughput(Throughput::Elements(nodes(&grown) as u64));
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            group.bench_function(BenchmarkId::new(name, format!("{threads} threads")), |bencher| {
+                pool.install(|| bencher.iter_batched_ref(|| case.growth(), Growth::run, BatchSize::LargeInput));
+            });
+        }
+    }
+    group.finish();
+}
+
+/// The questions of a growth to an index over nodes, asked of the grid, of kiddo and of all points in turn.
+///
+/// kiddo's tree stands for a point set that stays. Growth adds points between questions, for which that tree would have to be
+/// built anew, and its tree that takes points refuses those that share a coordinate.
+fn index(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("index");
+    for count in [1000, 10_000, 100_000] {
+        let mut rng = Stream::Statistics.rng(1);
+        let ball = Ball::new(Vec3::ZERO, 0.5).expect("a ball of radius 0.5");
+        let (mut points, mut centers) = (Vec::new(), Vec::new());
+        ball.draw(&mut rng, count, &mut points);
+        ball.draw(&mut rng, 1000, &mut centers);
+        let radius = (0.52 / count as f32).cbrt();
+        let mut grid = PointGrid::new(&Aabb3d::new(Vec3::ZERO, Vec3::splat(0.5)), 1.25 * radius);
+        points.iter().for_each(|&point| _ = grid.push(point));
+        let coordinates: Vec<[f32; 3]> = points.iter().map(|point| point.to_array()).collect();
+        let tree = ImmutableKdTree::<f32, 3>::new_from_slice(&coordinates).expect("points to build from");
+
+        group.throughput(Throughput::Elements(centers.len() as u64));
+        group.bench_function(BenchmarkId::new("grid, any within", count), |bencher| {
+            bencher.iter(|| centers.iter().filter(|&&center| grid.any_within(black_box(center), radius)).count());
+        });
+        group.bench_function(BenchmarkId::new("grid, nearest within", count), |bencher| {
+            bencher.iter(|| centers.iter().filter_map(|&center| grid.nearest_within(center, radius, |_| true)).count());
+        });
+        group.bench_function(BenchmarkId::new("kiddo, nearest", count), |bencher| {
+            let nearest =
+                |center: &Vec3| tree.query(&center.to_array()).nearest_one::<SquaredEuclidean<f32>>().execute();
+            bencher.iter(|| centers.iter().map(|center| nearest(black_box(center)).distance).sum::<f32>());
+        });
+        if count <= 10_000 {
+            group.bench_function(BenchmarkId::new("all points, nearest", count), |bencher| {
+                let nearest =
+                    |center: &Vec3| points.iter().map(|p| p.distance_squared(*center)).fold(f32::MAX, f32::min);
+                bencher.iter(|| centers.iter().map(|center| nearest(black_box(center))).sum::<f32>());
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, reference, scale, index);
+criterion_main!(benches);
