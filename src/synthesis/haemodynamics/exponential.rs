@@ -27,14 +27,22 @@ pub(super) fn exp_m1(x: f64) -> f64 {
     if x.abs() < 0.35 { small_exp_m1(x) } else { exp(x) - 1.0 }
 }
 
-/// e^x − 1 for |x| ≤ 0.35, by its series.
+/// e^x − 1 for |x| ≤ 0.35, by its series: Σ xⁿ/n!.
 fn small_exp_m1(x: f64) -> f64 {
-    let mut sum = 1.0;
-    for n in (2..=14).rev() {
-        sum = 1.0 + x * sum / f64::from(n);
-    }
-    x * sum
+    x * INVERSE_FACTORIALS.iter().rev().fold(0.0, |sum, coefficient| coefficient + x * sum)
 }
+
+/// 1/n! from n = 1.
+const INVERSE_FACTORIALS: [f64; 14] = {
+    let mut inverses = [1.0; 14];
+    let (mut n, mut factorial) = (1, 1.0);
+    while n < 14 {
+        factorial *= (n + 1) as f64;
+        inverses[n] = 1.0 / factorial;
+        n += 1;
+    }
+    inverses
+};
 
 /// The natural logarithm of a positive number within the range of `f32`.
 pub(super) fn ln(x: f64) -> f64 {

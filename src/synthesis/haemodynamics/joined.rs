@@ -9,8 +9,9 @@
 //! pressures obey (Tₐ − E·Tᵥ⁻¹·Eᵀ)·p = b. The matrix is symmetric and positive, and conjugate gradients preconditioned
 //! by Tₐ⁻¹ need one pair of sweeps of each tree in a pass. The error falls by the factor (1 − √(1 − c))/(1 + √(1 − c))
 //! or better, where c < 1 is the largest share of a change of pressure that comes back through the links from the other
-//! side. It is small where the bed resists as it does in a body, with a fourth of the pressure or more: then some ten
-//! passes reach rounding. It nears 1 where links hardly resist, and passes become many; the limit of passes is an error.
+//! side: few where the bed resists much, many where it hardly does. With two trees of 100,000 segments and 3,000 links it
+//! takes 12 passes where the bed takes about half of the pressure, 34 for a sixth of it, 81 for a thirtieth.
+//! The limit of passes is an error. From the last solution on it takes none where nothing has changed.
 //! A piece that hangs between links alone could have any pressure; a leak of 10⁻¹¹ of each link into the pool gives it
 //! the pool's. Open ends are solved for by Newton's method around it, as in a single tree.
 
@@ -120,7 +121,7 @@ pub struct Circulation {
 }
 
 impl Circulation {
-    /// Passes of the conjugate gradients before they count as failed; some ten are usual.
+    /// Passes of the conjugate gradients before they count as failed; ten to eighty are usual.
     const MOST_PASSES: usize = 500;
     /// Imbalance of a linked node, relative to the largest flow in a link, and correction of its pressure, relative to the
     /// largest, at which they end.
