@@ -61,14 +61,15 @@ pub mod render;
 pub mod prelude {
     pub use crate::VesselPlugin;
     pub use crate::plugin::{
-        EntityCommandsExt, GrowthAction, GrowthBudget, GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished,
-        GrowthPhase, GrowthProgress, OrganVessels, SegmentColoring, Vasculature, VesselAppearance, VesselSystem,
-        Vessels,
+        BloodLoss, Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, GrowthAction, GrowthBudget,
+        GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, OrganVessels,
+        Perfusion, SegmentColoring, Vasculature, VesselAppearance, VesselSystem, VesselWounds, Vessels,
     };
     pub use crate::synthesis::colonization::ColonizationSettings;
     pub use crate::synthesis::preset::PresetName;
     pub use crate::synthesis::roots::RootPlacement;
     pub use crate::synthesis::tissue::{TissueMode, TissueSettings};
+    pub use crate::synthesis::wound::Blade;
 }
 
 #[cfg(feature = "plugin")]

@@ -4,6 +4,7 @@ use crate::plugin::{
     components::{GrowthControl, Vasculature},
     messages::{GrowthAction, OrganError},
     organ_mesh::OrganMeshError,
+    vessels::Lineage,
 };
 use crate::synthesis::{
     colonization::{Growth, SettingsWarning},
@@ -44,6 +45,8 @@ pub struct GrowthState {
     preparation: Option<Task<Prepared>>,
     tissue: Option<Arc<dyn Tissue>>,
     growth: Option<Growth>,
+    /// Which growth it is.
+    lineage: Lineage,
     error: Option<OrganError>,
     /// Warnings that have been given for the settings.
     warned: Vec<SettingsWarning>,
@@ -144,6 +147,7 @@ impl GrowthState {
         self.tissue = None;
         self.error = None;
         self.rebuild |= self.growth.take().is_some();
+        self.lineage = Lineage::new_one();
     }
 
     /// Waits for a tissue from now on.
@@ -179,6 +183,7 @@ impl GrowthState {
         self.need = Need::Nothing;
         self.error = None;
         self.rebuild = true;
+        self.lineage = Lineage::new_one();
         let Some(tissue) = self.tissue.clone() else { return Ok(Vec::new()) };
         let mut settings = wish.settings.clone();
         if wish.fit {
@@ -204,6 +209,7 @@ impl GrowthState {
         self.need = Need::Nothing;
         self.preparation = None;
         self.growth = None;
+        self.lineage = Lineage::new_one();
         self.rebuild = true;
         self.finish = false;
         self.error = Some(error);
@@ -244,6 +250,11 @@ impl GrowthState {
     pub(crate) fn news(&self, system: System) -> (Option<&Growth>, Option<&[u32]>) {
         let changed = (!self.rebuild).then_some(self.changed[system.index()].as_slice());
         (self.growth.as_ref(), changed)
+    }
+
+    /// Which growth it is: another one after each start.
+    pub(crate) fn lineage(&self) -> Lineage {
+        self.lineage
     }
 
     /// Forgets what has been published.

@@ -6,35 +6,58 @@
 //! ```text
 //! Source      commands, wishes, mesh assets ─► tissue (in the task pool) ─► growth, started
 //! Grow        steps, one organ after the other, within the GrowthBudget
-//! Cut         (empty)
-//! Circulate   (empty)
+//! Cut         CuttableVessels, VesselCommand ─► VesselWounds, OpenEnd entities
+//! Circulate   VesselWounds ─► flow, bleeding, supply of the tissue
 //! Publish     new and changed nodes ─► Vessels, SegmentChanges, Aabb; diagnostics
 //! ```
 
+mod circulation;
 mod commands;
 mod components;
+mod cutting;
+mod deformation;
 pub mod diagnostics;
 mod growth;
 mod growth_state;
 mod messages;
+mod open_ends;
+mod operations;
 mod organ_mesh;
+mod perfusion;
+mod probe;
 mod procedural;
 mod publish;
 mod segment_changes;
+mod theatre;
 mod tissue_source;
+mod vessel_index;
 mod vessels;
+mod wounds;
 
+pub use circulation::CirculationState;
 pub use commands::EntityCommandsExt;
 pub use components::{
     GrowthControl, GrowthPhase, GrowthProgress, OrganVessels, SegmentColoring, Vasculature, VesselAppearance,
     VesselSystem, VesselsOf,
 };
+pub use cutting::CuttableVessels;
+pub use deformation::FollowsMesh;
 pub use growth::{GrowthBudget, GrowthFrame};
 pub use growth_state::GrowthState;
 pub use messages::{GrowthAction, GrowthCommand, GrowthFailed, GrowthFinished, GrowthStarted, OrganError};
+pub use open_ends::{OpenEnd, OpenEndEntities};
+pub use operations::{
+    OperationError, OperationKind, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,
+};
 pub use organ_mesh::{OrganMeshError, read_mesh};
+pub use perfusion::{
+    BleedingStarted, BleedingStopped, BloodLoss, CirculationFailed, OrganSupply, Patient, Perfusion, SegmentSupply,
+};
+pub use probe::{VesselPlace, VesselProbe};
 pub use segment_changes::SegmentChanges;
+pub use vessel_index::VesselIndex;
 pub use vessels::Vessels;
+pub use wounds::{Cuttable, VesselWounds};
 
 use bevy::{
     app::{App, Plugin, Update},
@@ -87,7 +110,15 @@ impl Plugin for GrowthPlugin {
             .add_message::<GrowthStarted>()
             .add_message::<GrowthFinished>()
             .add_message::<GrowthFailed>()
-            .add_observer(publish::remove_vessels);
+            .init_resource::<CuttableVessels>()
+            .add_message::<VesselCommand>()
+            .add_message::<VesselOperation>()
+            .add_message::<VesselOperationFailed>()
+            .add_message::<BleedingStarted>()
+            .add_message::<BleedingStopped>()
+            .add_message::<CirculationFailed>()
+            .add_observer(publish::remove_vessels)
+            .add_observer(wounds::remove_wounds);
         diagnostics::register(app);
         app.configure_sets(
             self.schedule,
@@ -112,7 +143,17 @@ impl Plugin for GrowthPlugin {
                     .chain()
                     .in_set(VesselSystems::Source),
                 (growth::grow, growth::end_growths).chain().in_set(VesselSystems::Grow),
-                (publish::publish_vessels, publish::show_systems, diagnostics::measure)
+                (
+                    wounds::attach_wounds,
+                    wounds::clear_outdated,
+                    wounds::follow_settings,
+                    vessel_index::index_vessels,
+                    cutting::carry_out,
+                    open_ends::spawn_open_ends,
+                )
+                    .chain()
+                    .in_set(VesselSystems::Cut),
+                (publish::publish_vessels, open_ends::move_open_ends, publish::show_systems, diagnostics::measure)
                     .chain()
                     .in_set(VesselSystems::Publish),
             ),

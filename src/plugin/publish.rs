@@ -6,7 +6,8 @@ use crate::plugin::{
     components::{GrowthProgress, OrganVessels, Vasculature, VesselAppearance, VesselSystem, VesselsOf},
     growth_state::GrowthState,
     segment_changes::SegmentChanges,
-    vessels::Vessels,
+    vessel_index::VesselIndex,
+    vessels::{Lineage, Vessels},
 };
 use crate::synthesis::{colonization::Growth, tree::System};
 use bevy::{
@@ -32,6 +33,7 @@ pub(crate) struct PublishedVessels {
     vessels: &'static mut Vessels,
     changes: &'static mut SegmentChanges,
     aabb: &'static mut Aabb,
+    index: Option<&'static mut VesselIndex>,
 }
 
 /// Brings the vessel entities up to date with the growths. Spawns those that are missing.
@@ -53,7 +55,9 @@ pub(crate) fn publish_vessels(
                     }
                 }
                 News::Despawn(entity) => commands.entity(entity).try_despawn(),
-                News::Spawn(growth) => spawn_vessels(&mut commands, organ, system, growth, appearance),
+                News::Spawn(growth) => {
+                    spawn_vessels(&mut commands, organ, system, (growth, state.lineage()), appearance);
+                }
             }
         }
         state.clear_news();
@@ -103,15 +107,24 @@ fn news(state: &GrowthState, system: System, entity: Option<Entity>) -> News<'_>
 impl PublishedVesselsItem<'_, '_> {
     fn update(&mut self, state: &GrowthState) {
         let (growth, changed) = state.news(self.system.0);
-        self.vessels.follow(growth, self.system.0, changed, &mut self.changes);
+        self.vessels.follow(growth, state.lineage(), self.system.0, changed, &mut self.changes);
+        if let Some(index) = &mut self.index {
+            index.note_moved(&self.vessels, changed);
+        }
         let aabb = self.vessels.aabb();
         self.aabb.set_if_neq(aabb);
     }
 }
 
-fn spawn_vessels(commands: &mut Commands, organ: Entity, system: System, growth: &Growth, look: &VesselAppearance) {
+fn spawn_vessels(
+    commands: &mut Commands,
+    organ: Entity,
+    system: System,
+    (growth, lineage): (&Growth, Lineage),
+    look: &VesselAppearance,
+) {
     let (mut vessels, mut changes) = (Vessels::default(), SegmentChanges::default());
-    vessels.follow(Some(growth), system, None, &mut changes);
+    vessels.follow(Some(growth), lineage, system, None, &mut changes);
     let visibility = visibility_of(look, system);
     let name = Name::new(match system {
         System::Arterial => "Arteries",

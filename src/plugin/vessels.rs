@@ -6,12 +6,26 @@ use crate::synthesis::{
     tree::{NO_PARENT, NodeId, System, VesselTree},
 };
 use bevy::{camera::primitives::Aabb, ecs::component::Component, math::Vec3};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Tells one tree from another that took its place. The same while a tree grows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Lineage(u64);
+
+impl Lineage {
+    /// One that no other tree has.
+    pub fn new_one() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
 
 /// The vessels of one system of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
 /// off its surface where the settings say so.
-#[derive(Component, Clone, Debug, Default, PartialEq)]
+#[derive(Component, Clone, Debug, Default)]
 pub struct Vessels {
     tree: VesselTree,
+    lineage: Lineage,
     birth_steps: Vec<u32>,
     /// First child of every node, [`NO_PARENT`] for none.
     first_children: Vec<u32>,
@@ -23,12 +37,13 @@ pub struct Vessels {
 impl Vessels {
     /// Vessels that did not grow here, such as a network read from a file, to be drawn like others.
     ///
-    /// Put them on an entity with a [`VesselSystem`](crate::plugin::VesselSystem) and
+    /// They count as other vessels than those that they replace, so that wounds of these are forgotten. Put them on an
+    /// entity with a [`VesselSystem`](crate::plugin::VesselSystem) and
     /// [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. Whoever replaces them later marks what
     /// became different in the entity's [`SegmentChanges`]. Nodes beyond the end of `birth_steps` count as born in
     /// step 0.
     pub fn from_tree(tree: &VesselTree, birth_steps: &[u32]) -> Self {
-        let mut vessels = Self::default();
+        let mut vessels = Self { lineage: Lineage::new_one(), ..Self::default() };
         for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
             vessels.push(position, tree.parents()[node], radius, birth_steps.get(node).copied().unwrap_or(0));
         }
@@ -38,6 +53,11 @@ impl Vessels {
     /// The tree. While the organ grows, it only gets longer and thicker; a restart empties it.
     pub fn tree(&self) -> &VesselTree {
         &self.tree
+    }
+
+    /// Which tree it is.
+    pub(crate) fn lineage(&self) -> Lineage {
+        self.lineage
     }
 
     /// The step in which each node was born, 0 for roots.
@@ -58,10 +78,12 @@ impl Vessels {
     pub(crate) fn follow(
         &mut self,
         growth: Option<&Growth>,
+        lineage: Lineage,
         system: System,
         changed: Option<&[u32]>,
         changes: &mut SegmentChanges,
     ) {
+        self.lineage = lineage;
         if changed.is_none() {
             self.clear();
             changes.mark_all();
@@ -126,8 +148,15 @@ impl Vessels {
         self.bounds = Some((min.min(position - radius), max.max(position + radius)));
     }
 
-    fn children(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn children(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
         let link = |child: u32| (child != NO_PARENT).then_some(child as usize);
         std::iter::successors(link(self.first_children[node]), move |&child| link(self.next_siblings[child]))
+    }
+}
+
+/// Which tree of a growth it is makes no difference.
+impl PartialEq for Vessels {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.tree, &self.birth_steps) == (&other.tree, &other.birth_steps)
     }
 }

@@ -1,0 +1,163 @@
+//! Open ends of severed vessels as entities: where blood leaves, for particles, sounds and instruments.
+//!
+//! In: the ledgers in [`VesselWounds`]. Out: one entity with an [`OpenEnd`] for each open lumen, child of its vessel
+//! entity, that moves with the tissue and is despawned when the lumen closes.
+
+use crate::plugin::{
+    components::{VesselSystem, VesselsOf},
+    vessels::Vessels,
+    wounds::{VesselWounds, generation},
+};
+use crate::synthesis::{
+    tree::{Place, System},
+    units::{Flow, Pressure, Volume},
+    wound::{EndId, EndSide, EndState, SeveredEnd},
+};
+use bevy::{
+    camera::visibility::Visibility,
+    ecs::{
+        change_detection::DetectChanges,
+        component::Component,
+        entity::Entity,
+        hierarchy::ChildOf,
+        query::{Changed, Or},
+        reflect::ReflectComponent,
+        system::{Commands, Query},
+        world::Ref,
+    },
+    math::Vec3,
+    reflect::Reflect,
+    transform::components::Transform,
+};
+use std::collections::BTreeMap;
+
+/// An open end of a severed vessel. For reading: the plugin writes it.
+///
+/// The entity's `Transform` is at the end's tip and faces out of the lumen (its forward direction), in the space of the
+/// organ's mesh. Blood leaves it only where the organ has a [`Perfusion`](crate::plugin::Perfusion).
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Clone, PartialEq)]
+#[require(Transform, Visibility)]
+pub struct OpenEnd {
+    /// The organ.
+    pub organ: Entity,
+    /// The vessel entity.
+    pub vessels: Entity,
+    /// Whether it is an artery's end or a vein's.
+    pub system: System,
+    /// What the ledger knows it by.
+    pub id: EndId,
+    /// Where on the tree it is.
+    pub place: Place,
+    /// Which side of the cut it is.
+    pub side: EndSide,
+    /// Position in the space of the organ's mesh.
+    pub position: Vec3,
+    /// Unit vector out of the lumen, in the space of the organ's mesh.
+    pub direction: Vec3,
+    /// Radius of the vessel, in tissue lengths.
+    pub radius: f32,
+    /// Number of bifurcations between the root and here.
+    pub generation: u32,
+    /// What leaves it, as a mean over the last frame.
+    pub flow: Flow,
+    /// Pressure in the vessel before the hole.
+    pub pressure: Pressure,
+    /// Mean velocity in the hole, in m/s: how fast a drop leaves.
+    pub velocity: f64,
+    /// What it has lost since it was opened.
+    pub lost: Volume,
+    /// Whether it bleeds, and if not, why.
+    pub state: EndState,
+}
+
+impl OpenEnd {
+    fn new(organ: Entity, vessels: Entity, system: System, end: &SeveredEnd, generation: u32) -> Self {
+        Self {
+            organ,
+            vessels,
+            system,
+            id: end.id,
+            place: end.place,
+            side: end.side,
+            position: end.position,
+            direction: end.direction,
+            radius: end.radius,
+            generation,
+            flow: Flow::ZERO,
+            pressure: Pressure::ZERO,
+            velocity: 0.0,
+            lost: Volume::ZERO,
+            state: EndState::Dry,
+        }
+    }
+
+    /// Where it is and where it faces.
+    fn pose(end: &SeveredEnd) -> Transform {
+        Transform::from_translation(end.position).looking_to(end.direction, end.direction.any_orthogonal_vector())
+    }
+}
+
+/// The entities of the open ends of a vessel entity.
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
+pub struct OpenEndEntities(BTreeMap<EndId, Entity>);
+
+impl OpenEndEntities {
+    /// The entity of an end, while that is open.
+    pub fn get(&self, end: EndId) -> Option<Entity> {
+        self.0.get(&end).copied()
+    }
+
+    /// All ends, in the order in which they were made.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (EndId, Entity)> + '_ {
+        self.0.iter().map(|(&end, &entity)| (end, entity))
+    }
+}
+
+/// Cut: an entity for each end that is open now, and none for others.
+pub(crate) fn spawn_open_ends(
+    mut commands: Commands,
+    mut vessels: Query<
+        (Entity, &VesselsOf, &VesselSystem, &Vessels, &VesselWounds, &mut OpenEndEntities),
+        Changed<VesselWounds>,
+    >,
+) {
+    for (entity, organ, system, vessels, wounds, mut entities) in &mut vessels {
+        let mut before = std::mem::take(&mut entities.0);
+        for end in wounds.ends(vessels.tree()).filter(|end| end.is_open) {
+            let spawned = before.remove(&end.id).unwrap_or_else(|| {
+                let generation = generation(vessels, end.place);
+                let open_end = OpenEnd::new(organ.0, entity, system.0, &end, generation);
+                commands.spawn((open_end, OpenEnd::pose(&end), ChildOf(entity))).id()
+            });
+            entities.0.insert(end.id, spawned);
+        }
+        before.into_values().for_each(|closed| commands.entity(closed).try_despawn());
+    }
+}
+
+/// Publish: open ends move with their vessels.
+pub(crate) fn move_open_ends(
+    vessels: Query<(Ref<Vessels>, &VesselWounds, &OpenEndEntities), Or<(Changed<Vessels>, Changed<VesselWounds>)>>,
+    mut ends: Query<(&mut OpenEnd, &mut Transform)>,
+) {
+    for (vessels, wounds, entities) in vessels.iter().filter(|(vessels, wounds, _)| wounds.is_of(vessels)) {
+        for (id, entity) in entities.iter() {
+            let (Some(now), Ok((mut end, mut transform))) = (wounds.end(id, vessels.tree()), ends.get_mut(entity))
+            else {
+                continue;
+            };
+            let moved = OpenEnd {
+                place: now.place,
+                position: now.position,
+                direction: now.direction,
+                radius: now.radius,
+                ..*end
+            };
+            if *end != moved || vessels.is_added() {
+                *end = moved;
+                *transform = OpenEnd::pose(&now);
+            }
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! What makes blood flow in an organ's vessels, and what is known of it: settings, patient, loss and supply.
+
+use crate::plugin::{circulation::CirculationState, wounds::Cuttable};
+use crate::synthesis::{
+    haemodynamics::{BedSettings, FlowError, FlowSettings, RootPressure, ViscosityLaw},
+    tree::System,
+    units::{Flow, Pressure, Scale, Volume},
+    wound::{BleedingSettings, BloodVolume, BloodVolumeSettings, EndId, EndSide},
+};
+use bevy::{
+    ecs::{component::Component, entity::Entity, message::Message, reflect::ReflectComponent},
+    reflect::{Reflect, std_traits::ReflectDefault},
+};
+
+/// Fills an organ's vessels with blood: put it beside the organ's [`Vasculature`](crate::plugin::Vasculature), and what
+/// is cut open bleeds.
+///
+/// Blood flows once the vessels have grown; those of fewer than 8192 nodes while they grow, too. As long as nothing is
+/// open it costs nothing. A change of a setting takes effect at the next frame: what is open goes on bleeding.
+///
+/// Flow is that of the organ at rest: neither its transform nor its deformation changes it.
+///
+/// ```
+/// # use bevy_vessels::{plugin::{Perfusion, Vasculature}, synthesis::{preset::PresetName, units::Scale}};
+/// let organ = (
+///     Vasculature::new(PresetName::Colon),
+///     Perfusion { scale: Scale::MILLIMETRES, ..Perfusion::default() },
+/// );
+/// ```
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+#[require(Cuttable, CirculationState, BloodLoss, OrganSupply)]
+pub struct Perfusion {
+    /// How long a unit of the organ's mesh is. Flow rises with its cube: a wrong scale shows at once.
+    ///
+    /// The scale of the organ's transform doesn't count. Default: [`Scale::METRES`], as in glTF files and Bevy's worlds.
+    pub scale: Scale,
+    /// How viscosity depends on the diameter. Default: [`ViscosityLaw::IN_VIVO`].
+    pub viscosity: ViscosityLaw,
+    /// Pressure at the arteries' roots; a [`Pulse`](crate::synthesis::haemodynamics::Pulse) makes them spurt.
+    ///
+    /// Default: constant, [`FlowSettings::DEFAULT_ARTERIAL_PRESSURE`].
+    pub arterial_pressure: RootPressure,
+    /// Pressure at the veins' roots. Default: constant, [`FlowSettings::DEFAULT_VENOUS_PRESSURE`].
+    pub venous_pressure: RootPressure,
+    /// The capillary bed behind the terminals.
+    ///
+    /// With a resistance, arteries and veins of an organ that grew are joined where an artery supplied a drain that a
+    /// vein then drained, so that one side feels what the other loses; each frame then takes several sweeps over both
+    /// trees. Without, each side drains into the bed by itself, and a frame costs only as much as there are open ends.
+    ///
+    /// Default: without a resistance.
+    pub bed: BedSettings,
+    /// Pressure outside the vessels. Default: that of the air, 0.
+    pub ambient: Pressure,
+    /// Discharge coefficient of open ends. Limits: > 0, at most 1. Default:
+    /// [`FlowSettings::DEFAULT_DISCHARGE_COEFFICIENT`].
+    pub discharge_coefficient: f32,
+    /// How open ends bleed and clot.
+    pub bleeding: BleedingSettings,
+    /// Supply below which tissue counts as ischaemic. Limits: 0 to 1. Default: [`Self::DEFAULT_ISCHAEMIC_BELOW`].
+    pub ischaemic_below: f32,
+    /// Least time between two measurements of the supply while something bleeds; after an action it is measured at once.
+    /// Each is a sweep over the whole tree, for large ones beside the frames.
+    ///
+    /// Units: seconds. Limits: ≥ 0. Default: [`Self::DEFAULT_SUPPLY_INTERVAL`].
+    pub supply_interval: f32,
+    /// Whether time stands still for the blood of this organ. Default: false.
+    pub paused: bool,
+}
+
+impl Perfusion {
+    /// Default of [`ischaemic_below`](Self::ischaemic_below): half of what the intact organ has.
+    pub const DEFAULT_ISCHAEMIC_BELOW: f32 = 0.5;
+    /// Default of [`supply_interval`](Self::supply_interval), in seconds.
+    pub const DEFAULT_SUPPLY_INTERVAL: f32 = 0.5;
+
+    /// What the flow of a system depends on.
+    pub fn flow_settings(&self, system: System) -> FlowSettings {
+        FlowSettings {
+            scale: self.scale,
+            viscosity: self.viscosity,
+            root: match system {
+                System::Arterial => self.arterial_pressure,
+                System::Venous => self.venous_pressure,
+            },
+            bed: self.bed,
+            ambient: self.ambient,
+            discharge_coefficient: self.discharge_coefficient,
+        }
+    }
+}
+
+impl Default for Perfusion {
+    fn default() -> Self {
+        let (arterial, venous) = (FlowSettings::arterial(), FlowSettings::venous());
+        Self {
+            scale: Scale::METRES,
+            viscosity: arterial.viscosity,
+            arterial_pressure: arterial.root,
+            venous_pressure: venous.root,
+            bed: arterial.bed,
+            ambient: arterial.ambient,
+            discharge_coefficient: arterial.discharge_coefficient,
+            bleeding: BleedingSettings::default(),
+            ischaemic_below: Self::DEFAULT_ISCHAEMIC_BELOW,
+            supply_interval: Self::DEFAULT_SUPPLY_INTERVAL,
+            paused: false,
+        }
+    }
+}
+
+/// The blood of one patient: whose loss lowers the pressure in all organs.
+///
+/// Put it on an organ, or on an entity above several organs, which then share it. An organ that finds none on itself or
+/// above gets one of its own, with the default settings.
+#[derive(Component, Clone, Copy, Debug, PartialEq)]
+pub struct Patient {
+    pub(crate) blood: BloodVolume,
+}
+
+impl Patient {
+    /// A patient who has lost no blood.
+    ///
+    /// # Errors
+    /// When a setting is outside its limits.
+    pub fn new(settings: BloodVolumeSettings) -> Result<Self, FlowError> {
+        Ok(Self { blood: BloodVolume::new(settings)? })
+    }
+
+    /// The patient's blood.
+    pub fn blood(&self) -> &BloodVolume {
+        &self.blood
+    }
+}
+
+impl Default for Patient {
+    fn default() -> Self {
+        Self::new(BloodVolumeSettings::default()).expect("defaults are within their limits")
+    }
+}
+
+/// What an organ bleeds. For reading: the plugin writes it.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct BloodLoss {
+    /// All that it has lost.
+    pub total: Volume,
+    /// What it loses, as a mean over the last frame.
+    pub rate: Flow,
+    /// The same of arteries and of veins.
+    pub rates: [Flow; 2],
+    /// Number of ends that bleed.
+    pub bleeding_ends: usize,
+}
+
+/// How much blood reaches the tissue of an organ, against the intact organ. For reading: the plugin writes it.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct OrganSupply {
+    /// Supply of every vertex of the organ's mesh by the arteries, from 0 to 1. Empty until it has been measured, and
+    /// for an organ without a mesh.
+    pub vertices: Vec<f32>,
+    /// Share of the bed that gets less than [`Perfusion::ischaemic_below`], from 0 to 1.
+    pub ischaemic_share: f32,
+}
+
+/// How much blood flows through the segments of a vessel entity, against the intact vessels. For reading: the plugin
+/// writes it.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct SegmentSupply {
+    /// Supply of every segment by the node that it ends in, from 0 to 1. Segments that grew later are missing.
+    pub segments: Vec<f32>,
+}
+
+/// An open end begins to bleed.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BleedingStarted {
+    /// The organ.
+    pub organ: Entity,
+    /// The vessel entity.
+    pub vessels: Entity,
+    /// What the ledger knows the end by.
+    pub end: EndId,
+    /// Which side of the cut it is.
+    pub side: EndSide,
+    /// Its [`OpenEnd`](crate::plugin::OpenEnd) entity.
+    pub entity: Entity,
+}
+
+/// An open end bleeds no more: it has clotted, has no pressure left, or was closed.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BleedingStopped {
+    /// The organ.
+    pub organ: Entity,
+    /// The vessel entity.
+    pub vessels: Entity,
+    /// What the ledger knew the end by.
+    pub end: EndId,
+    /// Which side of the cut it was.
+    pub side: EndSide,
+    /// Its [`OpenEnd`](crate::plugin::OpenEnd) entity, `None` if it was closed.
+    pub entity: Option<Entity>,
+}
+
+/// The blood of an organ can't flow. Other organs are not affected; a change of its [`Perfusion`] makes it try again.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct CirculationFailed {
+    /// The organ.
+    pub organ: Entity,
+    /// What was wrong, with the value and the remedy.
+    pub error: FlowError,
+}

@@ -1,0 +1,269 @@
+//! How an action on vessels is carried out: on which organs, in whose space, and what is remembered for undo.
+
+use crate::plugin::{
+    components::{OrganVessels, VesselSystem},
+    operations::{OperationError, OperationKind, VesselAction, VesselCommand, VesselOperation, VesselSite},
+    probe::{Near, Touch, mean_scale, nearest_place},
+    segment_changes::SegmentChanges,
+    vessel_index::VesselIndex,
+    vessels::Vessels,
+    wounds::{Cuttable, VesselWounds},
+};
+use crate::synthesis::{
+    tree::Place,
+    wound::{Blade, ClampId, WoundError, WoundReport, Wounds},
+};
+use bevy::{
+    ecs::{
+        change_detection::DetectChangesMut,
+        entity::Entity,
+        query::{QueryData, With},
+        system::{Query, SystemParam},
+    },
+    math::{Affine3A, Vec3},
+    transform::helper::TransformHelper,
+};
+
+/// Vessels to be operated on.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct Operated {
+    system: &'static VesselSystem,
+    vessels: &'static Vessels,
+    wounds: &'static mut VesselWounds,
+    index: &'static mut VesselIndex,
+    changes: &'static mut SegmentChanges,
+}
+
+/// All that an action may meet.
+#[derive(SystemParam)]
+pub(crate) struct Theatre<'w, 's> {
+    organs: Query<'w, 's, (Entity, &'static OrganVessels), With<Cuttable>>,
+    vessels: Query<'w, 's, Operated>,
+    transforms: TransformHelper<'w, 's>,
+}
+
+/// A vessel entity and its organ.
+#[derive(Clone, Copy, Debug)]
+struct Target {
+    organ: Entity,
+    vessels: Entity,
+}
+
+type Report = Result<WoundReport, OperationError>;
+
+impl Theatre<'_, '_> {
+    /// Carries out a command. The journal holds the vessel entities that each action changed.
+    pub(crate) fn carry_out(
+        &mut self,
+        command: &VesselCommand,
+        journal: &mut Vec<Vec<Entity>>,
+    ) -> Result<Vec<VesselOperation>, OperationError> {
+        let targets = self.targets(command.organ)?;
+        let done = match &command.action {
+            VesselAction::Undo => return Ok(self.undo(&targets, journal)),
+            VesselAction::UndoAll => return Ok(self.undo_all(&targets, journal)),
+            VesselAction::Cut(blade) => self.cut(&targets, blade)?,
+            VesselAction::Cauterise { volume, max_calibre } => self.cauterise(&targets, volume, *max_calibre)?,
+            VesselAction::Clamp(site) => {
+                let (target, place) = self.site(&targets, *site)?;
+                let clamp = |wounds: &mut Wounds, vessels: &Vessels| Ok(wounds.clamp(place, vessels.tree())?.1);
+                self.close(target, OperationKind::Clamped, clamp)?
+            }
+            VesselAction::Ligate(site) => {
+                let (target, place) = self.site(&targets, *site)?;
+                let tie = |wounds: &mut Wounds, vessels: &Vessels| wounds.ligate(place, vessels.tree());
+                self.close(target, OperationKind::Ligated, tie)?
+            }
+            VesselAction::Unclamp { vessels, clamp } => self.unclamp(target_of(&targets, *vessels)?, *clamp)?,
+            VesselAction::UnclampNear { point, reach } => {
+                let (target, clamp) = self.nearest_clamp(&targets, *point, *reach)?;
+                self.unclamp(target, clamp)?
+            }
+        };
+        if !done.is_empty() {
+            journal.push(done.iter().map(|operation| operation.vessels).collect());
+        }
+        Ok(done)
+    }
+
+    /// The vessel entities that a command is for, in the order of their organs.
+    fn targets(&self, organ: Option<Entity>) -> Result<Vec<Target>, OperationError> {
+        let of_organ = |(organ, entities): (Entity, &OrganVessels)| -> Vec<Target> {
+            let cuttable = entities.entities().iter().filter(|&&vessels| self.vessels.contains(vessels));
+            cuttable.map(|&vessels| Target { organ, vessels }).collect()
+        };
+        match organ {
+            Some(organ) => self.organs.get(organ).map(of_organ).map_err(|_| OperationError::NotCuttable { organ }),
+            None => {
+                let mut organs: Vec<_> = self.organs.iter().collect();
+                organs.sort_unstable_by_key(|&(organ, _)| organ);
+                Ok(organs.into_iter().flat_map(of_organ).collect())
+            }
+        }
+    }
+
+    /// From the space of a vessel entity to the world. `None` where a parent has no transform: it is not in the world.
+    fn to_world(&self, target: Target) -> Option<Affine3A> {
+        self.transforms.compute_global_transform(target.vessels).ok().map(|global| global.affine())
+    }
+
+    /// Does something to the ledger of a vessel entity, and reports it if it changed anything.
+    fn operate(
+        &mut self,
+        target: Target,
+        kind: OperationKind,
+        operation: impl FnOnce(&mut Wounds, &Vessels, &VesselIndex) -> Report,
+    ) -> Result<Option<VesselOperation>, OperationError> {
+        let Target { organ, vessels: entity } = target;
+        let mut found = self.vessels.get_mut(entity).map_err(|_| OperationError::NoVessels { vessels: entity })?;
+        found.index.refresh(found.vessels);
+        let report = operation(found.wounds.bypass_change_detection().ledger_mut(), found.vessels, &found.index)?;
+        if report.is_empty() {
+            return Ok(None);
+        }
+        found.wounds.note(&report, &mut found.changes);
+        Ok(Some(VesselOperation { organ, vessels: entity, system: found.system.0, kind, report }))
+    }
+
+    fn cut(&mut self, targets: &[Target], blade: &Blade) -> Result<Vec<VesselOperation>, OperationError> {
+        let mut done = Vec::new();
+        for (target, blade, _) in self.localised(targets, blade)? {
+            done.extend(self.operate(target, OperationKind::Cut, |wounds, vessels, index| {
+                let tree = vessels.tree();
+                Ok(wounds.cut(&blade, tree, |min, max, visit| index.candidates(tree, min, max, visit)))
+            })?);
+        }
+        Ok(done)
+    }
+
+    fn cauterise(
+        &mut self,
+        targets: &[Target],
+        volume: &Blade,
+        max_calibre: f32,
+    ) -> Result<Vec<VesselOperation>, OperationError> {
+        // Said before anything is done, so that what fails changes nothing.
+        if !(max_calibre > 0.0) {
+            return Err(WoundError::Calibre { calibre: max_calibre }.into());
+        }
+        let mut done = Vec::new();
+        for (target, volume, scale) in self.localised(targets, volume)? {
+            done.extend(self.operate(target, OperationKind::Cauterised, |wounds, vessels, index| {
+                let tree = vessels.tree();
+                let candidates = |min, max, visit: &mut dyn FnMut(_)| index.candidates(tree, min, max, visit);
+                Ok(wounds.cauterise(&volume, max_calibre / scale, tree, candidates)?)
+            })?);
+        }
+        Ok(done)
+    }
+
+    /// A blade in the space of each target, with that target's mean scale.
+    fn localised(&self, targets: &[Target], blade: &Blade) -> Result<Vec<(Target, Blade, f32)>, OperationError> {
+        let in_world = targets.iter().filter_map(|&target| Some((target, self.to_world(target)?)));
+        let localised = in_world.map(|(target, to_world)| match blade.to_local(&to_world) {
+            Ok(local) => Ok((target, local, mean_scale(&to_world))),
+            Err(error) => Err(OperationError::Blade { organ: target.organ, error }),
+        });
+        localised.collect()
+    }
+
+    fn close(
+        &mut self,
+        target: Target,
+        kind: OperationKind,
+        close: impl FnOnce(&mut Wounds, &Vessels) -> Result<WoundReport, WoundError>,
+    ) -> Result<Vec<VesselOperation>, OperationError> {
+        let done = self.operate(target, kind, |wounds, vessels, _| Ok(close(wounds, vessels)?))?;
+        Ok(done.into_iter().collect())
+    }
+
+    fn unclamp(&mut self, target: Target, clamp: ClampId) -> Result<Vec<VesselOperation>, OperationError> {
+        self.close(target, OperationKind::Unclamped, |wounds, vessels| wounds.unclamp(clamp, vessels.tree()))
+    }
+
+    fn site(&mut self, targets: &[Target], site: VesselSite) -> Result<(Target, Place), OperationError> {
+        match site {
+            VesselSite::At { vessels, place } => Ok((target_of(targets, vessels)?, place)),
+            VesselSite::Near { point, reach } => {
+                let near = self.nearest(targets, point, reach);
+                near.ok_or(OperationError::NothingNear { what: "vessel", point, reach })
+            }
+        }
+    }
+
+    fn nearest(&mut self, targets: &[Target], point: Vec3, reach: f32) -> Option<(Target, Place)> {
+        let mut best: Option<(Target, Near)> = None;
+        for &target in targets {
+            let Some(to_world) = self.to_world(target) else { continue };
+            let Ok(mut found) = self.vessels.get_mut(target.vessels) else { continue };
+            found.index.refresh(found.vessels);
+            let reach = best.map_or(reach, |(_, near)| near.distance);
+            let touch = Touch { point, reach, to_world };
+            let near = nearest_place(&touch, found.vessels, &found.wounds, &found.index);
+            if let Some(near) = near.filter(|near| best.is_none_or(|(_, best)| near.distance < best.distance)) {
+                best = Some((target, near));
+            }
+        }
+        best.map(|(target, near)| (target, near.place))
+    }
+
+    fn nearest_clamp(&self, targets: &[Target], point: Vec3, reach: f32) -> Result<(Target, ClampId), OperationError> {
+        let mut best = None;
+        let mut least = reach;
+        for &target in targets {
+            let (Some(to_world), Ok(found)) = (self.to_world(target), self.vessels.get(target.vessels)) else {
+                continue;
+            };
+            for (clamp, place) in found.wounds.clamps() {
+                let distance = to_world.transform_point3(found.vessels.tree().position_at(place)).distance(point);
+                if distance < least || (best.is_none() && distance == least) {
+                    least = distance;
+                    best = Some((target, clamp));
+                }
+            }
+        }
+        best.ok_or(OperationError::NothingNear { what: "clamp", point, reach })
+    }
+
+    /// Undoes the last action that changed one of the targets, on all of them that it changed.
+    fn undo(&mut self, targets: &[Target], journal: &mut Vec<Vec<Entity>>) -> Vec<VesselOperation> {
+        while let Some(at) =
+            journal.iter().rposition(|changed| targets.iter().any(|target| changed.contains(&target.vessels)))
+        {
+            let mut done = Vec::new();
+            for &target in targets.iter().filter(|target| journal[at].contains(&target.vessels)) {
+                let undo = |wounds: &mut Wounds, vessels: &Vessels, _: &VesselIndex| {
+                    Ok(wounds.undo(vessels.tree()).unwrap_or_default())
+                };
+                done.extend(self.operate(target, OperationKind::Undone, undo).ok().flatten());
+            }
+            forget(journal, at, targets);
+            // What a regrowth has cleared is nothing to undo: the one before it is meant.
+            if !done.is_empty() {
+                return done;
+            }
+        }
+        Vec::new()
+    }
+
+    fn undo_all(&mut self, targets: &[Target], journal: &mut Vec<Vec<Entity>>) -> Vec<VesselOperation> {
+        for at in (0..journal.len()).rev() {
+            forget(journal, at, targets);
+        }
+        let undo = |wounds: &mut Wounds, vessels: &Vessels, _: &VesselIndex| Ok(wounds.undo_all(vessels.tree()));
+        targets.iter().filter_map(|&target| self.operate(target, OperationKind::Undone, undo).ok().flatten()).collect()
+    }
+}
+
+/// Takes the targets out of an entry of the journal, and the entry out of the journal when none is left.
+fn forget(journal: &mut Vec<Vec<Entity>>, at: usize, targets: &[Target]) {
+    journal[at].retain(|entity| targets.iter().all(|target| target.vessels != *entity));
+    if journal[at].is_empty() {
+        journal.remove(at);
+    }
+}
+
+fn target_of(targets: &[Target], vessels: Entity) -> Result<Target, OperationError> {
+    targets.iter().find(|target| target.vessels == vessels).copied().ok_or(OperationError::NoVessels { vessels })
+}
