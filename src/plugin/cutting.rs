@@ -6,7 +6,7 @@
 //! changed.
 
 use crate::plugin::{
-    operations::{VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite},
+    operations::{OperationError, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite},
     theatre::Theatre,
 };
 use crate::synthesis::{
@@ -20,7 +20,7 @@ use bevy::{
         message::{MessageReader, MessageWriter},
         resource::Resource,
     },
-    log::warn,
+    log::{debug, warn},
     math::Vec3,
 };
 
@@ -48,6 +48,8 @@ pub struct CuttableVessels {
     queue: Vec<VesselCommand>,
     /// The vessel entities that each action changed, for those that can be undone.
     journal: Vec<Vec<Entity>>,
+    /// Organs whose transform has been complained of.
+    warned: Vec<Entity>,
 }
 
 impl CuttableVessels {
@@ -114,6 +116,25 @@ impl CuttableVessels {
         self.queue.push(command);
     }
 
+    /// Strikes a vessel entity, whose ledger has been cleared, from what can be undone.
+    pub(crate) fn forget(&mut self, vessels: Entity) {
+        self.journal.iter_mut().for_each(|changed| changed.retain(|&entity| entity != vessels));
+        self.journal.retain(|changed| !changed.is_empty());
+    }
+
+    /// Says what could not be done: in the log where that is news to whoever made the app.
+    fn complain(&mut self, error: &OperationError) {
+        match *error {
+            // What an instrument misses is part of the game.
+            OperationError::NothingNear { .. } => debug!("{error}"),
+            OperationError::Blade { organ, .. } if self.warned.contains(&organ) => {}
+            _ => warn!("a vessel command was not carried out: {error}"),
+        }
+        if let OperationError::Blade { organ, .. } = *error {
+            self.warned.push(organ);
+        }
+    }
+
     /// Number of actions that can be undone.
     pub fn actions(&self) -> usize {
         self.journal.len()
@@ -131,14 +152,15 @@ pub(crate) fn carry_out(
     if door.queue.is_empty() && commands.is_empty() {
         return;
     }
-    let CuttableVessels { queue, journal } = &mut *door;
+    let mut queue = std::mem::take(&mut door.queue);
     for command in queue.drain(..).chain(commands.read().cloned()) {
-        match theatre.carry_out(&command, journal) {
-            Ok(operations) => drop(done.write_batch(operations)),
-            Err(error) => {
-                warn!("a vessel command changed nothing: {error}");
-                failed.write(VesselOperationFailed { command, error });
-            }
+        let outcome = theatre.carry_out(&command, &mut door.journal);
+        done.write_batch(outcome.done);
+        for error in outcome.errors {
+            door.complain(&error);
+            failed.write(VesselOperationFailed { command: command.clone(), error });
         }
     }
+    // The queue keeps its memory.
+    door.queue = queue;
 }

@@ -44,6 +44,8 @@ pub struct GrowthState {
     /// A tissue being prepared. Letting go of the task cancels it, so that no outdated tissue ever arrives.
     preparation: Option<Task<Prepared>>,
     tissue: Option<Arc<dyn Tissue>>,
+    /// Which tissue it is, or will be when it is ready.
+    tissue_lineage: Lineage,
     growth: Option<Growth>,
     /// Which growth it is.
     lineage: Lineage,
@@ -145,6 +147,7 @@ impl GrowthState {
     pub(crate) fn drop_tissue(&mut self) {
         self.preparation = None;
         self.tissue = None;
+        self.tissue_lineage = Lineage::new_one();
         self.error = None;
         self.rebuild |= self.growth.take().is_some();
         self.lineage = Lineage::new_one();
@@ -255,6 +258,11 @@ impl GrowthState {
     /// Which growth it is: another one after each start.
     pub(crate) fn lineage(&self) -> Lineage {
         self.lineage
+    }
+
+    /// Which tissue it grows on: another one after each preparation.
+    pub(crate) fn tissue_lineage(&self) -> Lineage {
+        self.tissue_lineage
     }
 
     /// Forgets what has been published.

@@ -22,12 +22,14 @@ mod growth_state;
 mod messages;
 mod open_ends;
 mod operations;
+mod organ_flow;
 mod organ_mesh;
 mod perfusion;
 mod probe;
 mod procedural;
 mod publish;
 mod segment_changes;
+mod supply;
 mod theatre;
 mod tissue_source;
 mod vessel_index;
@@ -41,7 +43,7 @@ pub use components::{
     VesselSystem, VesselsOf,
 };
 pub use cutting::CuttableVessels;
-pub use deformation::FollowsMesh;
+pub use deformation::{FollowsMesh, RestMesh};
 pub use growth::{GrowthBudget, GrowthFrame};
 pub use growth_state::GrowthState;
 pub use messages::{GrowthAction, GrowthCommand, GrowthFailed, GrowthFinished, GrowthStarted, OrganError};
@@ -118,7 +120,10 @@ impl Plugin for GrowthPlugin {
             .add_message::<BleedingStopped>()
             .add_message::<CirculationFailed>()
             .add_observer(publish::remove_vessels)
-            .add_observer(wounds::remove_wounds);
+            .add_observer(wounds::remove_wounds)
+            .add_observer(wounds::forget_ledger)
+            .add_observer(circulation::remove_circulation)
+            .add_observer(deformation::release_vessels);
         diagnostics::register(app);
         app.configure_sets(
             self.schedule,
@@ -138,6 +143,7 @@ impl Plugin for GrowthPlugin {
                     tissue_source::obey_commands,
                     tissue_source::notice_changes,
                     tissue_source::begin,
+                    deformation::take_rest,
                     tissue_source::receive_tissues,
                 )
                     .chain()
@@ -153,7 +159,19 @@ impl Plugin for GrowthPlugin {
                 )
                     .chain()
                     .in_set(VesselSystems::Cut),
-                (publish::publish_vessels, open_ends::move_open_ends, publish::show_systems, diagnostics::measure)
+                (circulation::prepare_organs, circulation::make_flow, circulation::bleed, supply::measure_supply)
+                    .chain()
+                    .in_set(VesselSystems::Circulate),
+                (
+                    publish::publish_vessels,
+                    wounds::clear_outdated,
+                    open_ends::spawn_open_ends,
+                    deformation::attach_bindings,
+                    deformation::follow_meshes,
+                    open_ends::move_open_ends,
+                    publish::show_systems,
+                    diagnostics::measure,
+                )
                     .chain()
                     .in_set(VesselSystems::Publish),
             ),

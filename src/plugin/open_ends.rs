@@ -92,6 +92,12 @@ impl OpenEnd {
         }
     }
 
+    /// Bleeds no more, for want of blood.
+    pub(crate) fn dry(&mut self) {
+        (self.flow, self.pressure, self.velocity) = (Flow::ZERO, Pressure::ZERO, 0.0);
+        self.state = EndState::Dry;
+    }
+
     /// Where it is and where it faces.
     fn pose(end: &SeveredEnd) -> Transform {
         Transform::from_translation(end.position).looking_to(end.direction, end.direction.any_orthogonal_vector())

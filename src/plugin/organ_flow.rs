@@ -5,7 +5,7 @@
 
 use crate::plugin::perfusion::Perfusion;
 use crate::synthesis::{
-    haemodynamics::{self, BedLink, Circulation, FlowError, Interruption, Network, Outlet},
+    haemodynamics::{BedLink, Circulation, FlowError, Interruption, Network, Outlet},
     tree::{NodeId, System, VesselTree},
     units::Pressure,
     wound::{Bleeding, Blockage, BloodVolume, EndId, EndSide, Supply, TissueSupply, Wounds},
@@ -22,13 +22,6 @@ pub(crate) struct FlowingEnd {
     pub(crate) node: NodeId,
     pub(crate) side: EndSide,
     pub(crate) id: EndId,
-}
-
-impl FlowingEnd {
-    /// Whether it is at this end of this segment.
-    pub(crate) fn is_at(&self, node: NodeId, side: haemodynamics::EndSide) -> bool {
-        self.node == node && flow_side(self.side) == side
-    }
 }
 
 /// The networks of an organ.
@@ -48,9 +41,8 @@ impl Networks {
         match (arteries, veins) {
             (Some(arteries), Some(veins)) if perfusion.bed.resistance.is_some() && !links.is_empty() => {
                 // The growth may have gone on since the trees were published.
-                let is_there = |link: &&BedLink| {
-                    link.arterial.index() < arteries.len() && link.venous.index() < veins.len()
-                };
+                let is_there =
+                    |link: &&BedLink| link.arterial.index() < arteries.len() && link.venous.index() < veins.len();
                 let links: Vec<BedLink> = links.iter().filter(is_there).copied().collect();
                 Ok(Self::Joined(Box::new(Circulation::new(arteries, veins, &links)?)))
             }
@@ -74,6 +66,18 @@ impl Networks {
         }
     }
 
+    /// Holds bed and roots at a share of the pressure that the settings give them, that of a pulse in the mean.
+    fn hold_at(&mut self, share: f64) -> Result<(), FlowError> {
+        let lowered = |pressure: Pressure| Pressure::from_pascals(pressure.pascals() * share);
+        for system in System::ALL {
+            let Some(network) = self.get_mut(system) else { continue };
+            let (bed, root) = (network.settings().bed.pressure, network.settings().root.mean());
+            network.set_bed_pressure(lowered(bed))?;
+            network.set_root_pressure(lowered(root))?;
+        }
+        Ok(())
+    }
+
     fn solve(&mut self) -> Result<(), FlowError> {
         match self {
             Self::Apart(networks) => networks.iter_mut().flatten().try_for_each(Network::solve),
@@ -95,24 +99,29 @@ impl OrganFlow {
         Ok(Self { networks: Networks::new(&trees, perfusion, links)?, trees: Arc::new(trees) })
     }
 
+    /// Lays the gaps of an earlier flow of the same vessels over this one, so that its holes stay as they are.
+    pub(crate) fn keep_gaps_of(&mut self, before: &Self) -> Result<(), FlowError> {
+        for system in System::ALL {
+            let (Some(network), Some(before)) = (self.networks.get_mut(system), before.networks.get(system)) else {
+                continue;
+            };
+            let gaps: Vec<_> = before.interruptions().filter(|(node, _)| node.index() < network.len()).collect();
+            network.set_interruptions(&gaps)?;
+        }
+        Ok(())
+    }
+
     /// Lays the gaps of a ledger over a system's network, in place of those that were.
     ///
     /// Returns its open ends in the order of the network's. Segments that grew since are passed over.
-    pub(crate) fn lay(
-        &mut self,
-        system: System,
-        wounds: &Wounds,
-        before: Option<&Self>,
-    ) -> Result<Vec<FlowingEnd>, FlowError> {
+    pub(crate) fn lay(&mut self, system: System, wounds: &Wounds) -> Result<Vec<FlowingEnd>, FlowError> {
         let (Some(tree), Some(network)) = (&self.trees[system.index()], self.networks.get_mut(system)) else {
             return Ok(Vec::new());
         };
-        let before = before.and_then(|before| before.networks.get(system));
         let (mut gaps, mut ends) = (Vec::new(), Vec::new());
         for blockage in wounds.blockages().filter(|blockage| blockage.node.index() < network.len()) {
             let node = blockage.node;
-            let laid = network.interruption(node).or_else(|| before?.interruption(node));
-            gaps.push((node, interruption(&blockage, tree.radii()[node.index()], laid)));
+            gaps.push((node, interruption(&blockage, tree.radii()[node.index()], network.interruption(node))));
             let end = |side, id: Option<EndId>| id.map(|id| FlowingEnd { node, side, id });
             ends.extend(end(EndSide::Proximal, blockage.proximal));
             ends.extend(end(EndSide::Distal, blockage.distal));
@@ -146,13 +155,7 @@ impl OrganFlow {
     /// A copy to be measured, at the mean of the pulse and as much pressure as the patient has left.
     pub(crate) fn at_mean_pressure(&self, blood: &BloodVolume) -> Result<Self, FlowError> {
         let mut copy = Self { networks: self.networks.clone(), trees: Arc::clone(&self.trees) };
-        let lowered = |pressure: Pressure| Pressure::from_pascals(pressure.pascals() * blood.pressure_share());
-        for system in System::ALL {
-            let Some(network) = copy.networks.get_mut(system) else { continue };
-            let (bed, root) = (network.settings().bed.pressure, network.settings().root.mean());
-            network.set_bed_pressure(lowered(bed))?;
-            network.set_root_pressure(lowered(root))?;
-        }
+        copy.networks.hold_at(blood.pressure_share())?;
         Ok(copy)
     }
 }
@@ -184,6 +187,7 @@ impl SupplyGauge {
                 network.set_interruptions(&[])?;
             }
         }
+        networks.hold_at(1.0)?;
         networks.solve()?;
         let supply = |system: System| {
             let (tree, network) = (intact.trees[system.index()].as_ref(), networks.get(system));
@@ -200,7 +204,9 @@ impl SupplyGauge {
         let mut share = 0.0;
         for system in System::ALL {
             let supply = &mut self.of_systems[system.index()];
-            let (Some(tree), Some(network)) = (&flow.trees[system.index()], flow.networks.get(system)) else { continue };
+            let (Some(tree), Some(network)) = (&flow.trees[system.index()], flow.networks.get(system)) else {
+                continue;
+            };
             supply.update(tree, network);
             if system == System::Arterial {
                 share = supply.ischaemic_share(tree, ischaemic_below);
@@ -221,28 +227,12 @@ impl SupplyGauge {
 ///
 /// A hole keeps the radius that it was laid with, however its vessel has widened since, so that a clot in it stays.
 fn interruption(blockage: &Blockage, radius: f32, laid: Option<Interruption>) -> Interruption {
-    let outlet = |end: Option<EndId>| end.map(|_| Outlet { radius });
-    let new = Interruption {
-        first: blockage.first,
-        last: blockage.last,
-        proximal: outlet(blockage.proximal),
-        distal: outlet(blockage.distal),
-    };
+    let new = blockage.interruption(radius);
     let keep = |now: Option<Outlet>, before: Option<Outlet>| now.and(before.or(now));
     match laid {
-        Some(laid) if (laid.first, laid.last) == (new.first, new.last) => Interruption {
-            proximal: keep(new.proximal, laid.proximal),
-            distal: keep(new.distal, laid.distal),
-            ..new
-        },
+        Some(laid) if (laid.first, laid.last) == (new.first, new.last) => {
+            Interruption { proximal: keep(new.proximal, laid.proximal), distal: keep(new.distal, laid.distal), ..new }
+        }
         _ => new,
-    }
-}
-
-/// The flow's name for a side of a cut.
-fn flow_side(side: EndSide) -> haemodynamics::EndSide {
-    match side {
-        EndSide::Proximal => haemodynamics::EndSide::Proximal,
-        EndSide::Distal => haemodynamics::EndSide::Distal,
     }
 }

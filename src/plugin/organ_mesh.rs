@@ -62,6 +62,11 @@ pub fn read_mesh(mesh: &Mesh) -> Result<TriangleMesh, OrganMeshError> {
     Ok(TriangleMesh::new(copy.positions, copy.triangles, None)?)
 }
 
+/// The positions of a mesh's vertices, where they are in main memory and three floats each.
+pub(crate) fn vertex_positions(mesh: &Mesh) -> Option<&[[f32; 3]]> {
+    mesh.try_attribute(Mesh::ATTRIBUTE_POSITION).ok()?.as_float3()
+}
+
 /// Copies what [`read_mesh`] reads.
 pub(crate) fn copy_mesh(mesh: &Mesh) -> Result<MeshCopy, OrganMeshError> {
     let topology = mesh.primitive_topology();

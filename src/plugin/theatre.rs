@@ -50,41 +50,60 @@ struct Target {
     vessels: Entity,
 }
 
+/// What came of a command.
+#[derive(Debug, Default)]
+pub(crate) struct Outcome {
+    pub(crate) done: Vec<VesselOperation>,
+    pub(crate) errors: Vec<OperationError>,
+}
+
+impl From<Operations> for Outcome {
+    fn from(operations: Operations) -> Self {
+        match operations {
+            Ok(done) => Self { done, errors: Vec::new() },
+            Err(error) => Self { done: Vec::new(), errors: vec![error] },
+        }
+    }
+}
+
+type Operations = Result<Vec<VesselOperation>, OperationError>;
+
 type Report = Result<WoundReport, OperationError>;
 
 impl Theatre<'_, '_> {
     /// Carries out a command. The journal holds the vessel entities that each action changed.
-    pub(crate) fn carry_out(
-        &mut self,
-        command: &VesselCommand,
-        journal: &mut Vec<Vec<Entity>>,
-    ) -> Result<Vec<VesselOperation>, OperationError> {
-        let targets = self.targets(command.organ)?;
-        let done = match &command.action {
-            VesselAction::Undo => return Ok(self.undo(&targets, journal)),
-            VesselAction::UndoAll => return Ok(self.undo_all(&targets, journal)),
-            VesselAction::Cut(blade) => self.cut(&targets, blade)?,
-            VesselAction::Cauterise { volume, max_calibre } => self.cauterise(&targets, volume, *max_calibre)?,
-            VesselAction::Clamp(site) => {
-                let (target, place) = self.site(&targets, *site)?;
-                let clamp = |wounds: &mut Wounds, vessels: &Vessels| Ok(wounds.clamp(place, vessels.tree())?.1);
-                self.close(target, OperationKind::Clamped, clamp)?
-            }
-            VesselAction::Ligate(site) => {
-                let (target, place) = self.site(&targets, *site)?;
-                let tie = |wounds: &mut Wounds, vessels: &Vessels| wounds.ligate(place, vessels.tree());
-                self.close(target, OperationKind::Ligated, tie)?
-            }
-            VesselAction::Unclamp { vessels, clamp } => self.unclamp(target_of(&targets, *vessels)?, *clamp)?,
-            VesselAction::UnclampNear { point, reach } => {
-                let (target, clamp) = self.nearest_clamp(&targets, *point, *reach)?;
-                self.unclamp(target, clamp)?
-            }
+    pub(crate) fn carry_out(&mut self, command: &VesselCommand, journal: &mut Vec<Vec<Entity>>) -> Outcome {
+        let targets = match self.targets(command.organ) {
+            Ok(targets) => targets,
+            Err(error) => return Err(error).into(),
         };
-        if !done.is_empty() {
-            journal.push(done.iter().map(|operation| operation.vessels).collect());
+        match &command.action {
+            VesselAction::Undo => return Ok(self.undo(&targets, journal)).into(),
+            VesselAction::UndoAll => return Ok(self.undo_all(&targets, journal)).into(),
+            _ => {}
         }
-        Ok(done)
+        let outcome = self.act(&targets, &command.action);
+        if !outcome.done.is_empty() {
+            journal.push(outcome.done.iter().map(|operation| operation.vessels).collect());
+        }
+        outcome
+    }
+
+    fn act(&mut self, targets: &[Target], action: &VesselAction) -> Outcome {
+        match action {
+            VesselAction::Cut(blade) => self.cut(targets, blade),
+            VesselAction::Cauterise { volume, max_calibre } => self.cauterise(targets, volume, *max_calibre),
+            VesselAction::Clamp(site) => self.clamp(targets, *site).into(),
+            VesselAction::Ligate(site) => self.ligate(targets, *site).into(),
+            VesselAction::Unclamp { vessels, clamp } => {
+                target_of(targets, *vessels).and_then(|target| self.unclamp(target, *clamp)).into()
+            }
+            VesselAction::UnclampNear { point, reach } => self
+                .nearest_clamp(targets, *point, *reach)
+                .and_then(|(target, clamp)| self.unclamp(target, clamp))
+                .into(),
+            VesselAction::Undo | VesselAction::UndoAll => Outcome::default(),
+        }
     }
 
     /// The vessel entities that a command is for, in the order of their organs.
@@ -126,46 +145,56 @@ impl Theatre<'_, '_> {
         Ok(Some(VesselOperation { organ, vessels: entity, system: found.system.0, kind, report }))
     }
 
-    fn cut(&mut self, targets: &[Target], blade: &Blade) -> Result<Vec<VesselOperation>, OperationError> {
-        let mut done = Vec::new();
-        for (target, blade, _) in self.localised(targets, blade)? {
-            done.extend(self.operate(target, OperationKind::Cut, |wounds, vessels, index| {
-                let tree = vessels.tree();
-                Ok(wounds.cut(&blade, tree, |min, max, visit| index.candidates(tree, min, max, visit)))
-            })?);
-        }
-        Ok(done)
+    fn cut(&mut self, targets: &[Target], blade: &Blade) -> Outcome {
+        self.sweep(targets, blade, OperationKind::Cut, |wounds, vessels, index, blade, _| {
+            let tree = vessels.tree();
+            Ok(wounds.cut(blade, tree, |min, max, visit| index.candidates(tree, min, max, visit)))
+        })
     }
 
-    fn cauterise(
+    fn cauterise(&mut self, targets: &[Target], volume: &Blade, max_calibre: f32) -> Outcome {
+        self.sweep(targets, volume, OperationKind::Cauterised, |wounds, vessels, index, volume, scale| {
+            let tree = vessels.tree();
+            let candidates = |min, max, visit: &mut dyn FnMut(_)| index.candidates(tree, min, max, visit);
+            Ok(wounds.cauterise(volume, max_calibre / scale, tree, candidates)?)
+        })
+    }
+
+    /// Does something with a blade to each target, in that target's space and with its mean scale. A target for which
+    /// it fails doesn't keep it from the others; what would fail for all is said once.
+    fn sweep(
         &mut self,
         targets: &[Target],
-        volume: &Blade,
-        max_calibre: f32,
-    ) -> Result<Vec<VesselOperation>, OperationError> {
-        // Said before anything is done, so that what fails changes nothing.
-        if !(max_calibre > 0.0) {
-            return Err(WoundError::Calibre { calibre: max_calibre }.into());
+        blade: &Blade,
+        kind: OperationKind,
+        operation: impl Fn(&mut Wounds, &Vessels, &VesselIndex, &Blade, f32) -> Report,
+    ) -> Outcome {
+        let mut outcome = Outcome::default();
+        for &target in targets {
+            let Some(to_world) = self.to_world(target) else { continue };
+            let local = blade.to_local(&to_world);
+            let local = local.map_err(|error| OperationError::Blade { organ: target.organ, error });
+            let done = local.and_then(|local| {
+                let scale = mean_scale(&to_world);
+                self.operate(target, kind, |wounds, vessels, index| operation(wounds, vessels, index, &local, scale))
+            });
+            match done {
+                Ok(done) => outcome.done.extend(done),
+                Err(error) if outcome.errors.contains(&error) => {}
+                Err(error) => outcome.errors.push(error),
+            }
         }
-        let mut done = Vec::new();
-        for (target, volume, scale) in self.localised(targets, volume)? {
-            done.extend(self.operate(target, OperationKind::Cauterised, |wounds, vessels, index| {
-                let tree = vessels.tree();
-                let candidates = |min, max, visit: &mut dyn FnMut(_)| index.candidates(tree, min, max, visit);
-                Ok(wounds.cauterise(&volume, max_calibre / scale, tree, candidates)?)
-            })?);
-        }
-        Ok(done)
+        outcome
     }
 
-    /// A blade in the space of each target, with that target's mean scale.
-    fn localised(&self, targets: &[Target], blade: &Blade) -> Result<Vec<(Target, Blade, f32)>, OperationError> {
-        let in_world = targets.iter().filter_map(|&target| Some((target, self.to_world(target)?)));
-        let localised = in_world.map(|(target, to_world)| match blade.to_local(&to_world) {
-            Ok(local) => Ok((target, local, mean_scale(&to_world))),
-            Err(error) => Err(OperationError::Blade { organ: target.organ, error }),
-        });
-        localised.collect()
+    fn clamp(&mut self, targets: &[Target], site: VesselSite) -> Operations {
+        let (target, place) = self.site(targets, site)?;
+        self.close(target, OperationKind::Clamped, |wounds, vessels| Ok(wounds.clamp(place, vessels.tree())?.1))
+    }
+
+    fn ligate(&mut self, targets: &[Target], site: VesselSite) -> Operations {
+        let (target, place) = self.site(targets, site)?;
+        self.close(target, OperationKind::Ligated, |wounds, vessels| wounds.ligate(place, vessels.tree()))
     }
 
     fn close(
@@ -173,12 +202,12 @@ impl Theatre<'_, '_> {
         target: Target,
         kind: OperationKind,
         close: impl FnOnce(&mut Wounds, &Vessels) -> Result<WoundReport, WoundError>,
-    ) -> Result<Vec<VesselOperation>, OperationError> {
+    ) -> Operations {
         let done = self.operate(target, kind, |wounds, vessels, _| Ok(close(wounds, vessels)?))?;
         Ok(done.into_iter().collect())
     }
 
-    fn unclamp(&mut self, target: Target, clamp: ClampId) -> Result<Vec<VesselOperation>, OperationError> {
+    fn unclamp(&mut self, target: Target, clamp: ClampId) -> Operations {
         self.close(target, OperationKind::Unclamped, |wounds, vessels| wounds.unclamp(clamp, vessels.tree()))
     }
 

@@ -6,6 +6,7 @@
 
 use crate::plugin::{
     components::{GrowthControl, GrowthPhase, GrowthProgress, Vasculature},
+    deformation::RestMesh,
     growth_state::{GrowthState, Need, Prepared},
     messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganError},
     organ_mesh::{MeshCopy, OrganMeshError, copy_mesh},
@@ -40,6 +41,7 @@ pub(crate) struct Organ {
     pub(crate) mesh: Option<&'static Mesh3d>,
     pub(crate) state: &'static mut GrowthState,
     pub(crate) progress: &'static mut GrowthProgress,
+    rest: Option<&'static RestMesh>,
 }
 
 /// Where meshes come from.
@@ -70,12 +72,19 @@ pub(crate) fn obey_commands(
 }
 
 /// Compares wishes and meshes with what each growth follows.
-pub(crate) fn notice_changes(mut meshes: MessageReader<AssetEvent<Mesh>>, mut organs: Query<Organ>) {
-    let news: Vec<_> = meshes.read().filter_map(mesh_news).collect();
+///
+/// A mesh that vessels follow may have other positions than before: that is no change.
+pub(crate) fn notice_changes(
+    mut events: MessageReader<AssetEvent<Mesh>>,
+    meshes: Res<Assets<Mesh>>,
+    mut organs: Query<Organ>,
+) {
+    let news: Vec<_> = events.read().filter_map(mesh_news).collect();
     for mut organ in &mut organs {
         organ.follow();
         for &(mesh, replaced) in &news {
-            if organ.mesh.is_some_and(|organ_mesh| organ_mesh.id() == mesh) {
+            let is_deformed = || organ.rest.is_some_and(|rest| rest.is_of(meshes.get(mesh)));
+            if organ.mesh.is_some_and(|organ_mesh| organ_mesh.id() == mesh) && !is_deformed() {
                 organ.state.notice_mesh(mesh, replaced);
             }
         }

@@ -2,11 +2,15 @@
 
 use crate::plugin::segment_changes::SegmentChanges;
 use crate::synthesis::{
+    binding::{Binding, BindingError},
     colonization::Growth,
     tree::{NO_PARENT, NodeId, System, VesselTree},
 };
 use bevy::{camera::primitives::Aabb, ecs::component::Component, math::Vec3};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::{
+    borrow::Cow,
+    sync::atomic::{AtomicU64, Ordering},
+};
 
 /// Tells one tree from another that took its place. The same while a tree grows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,6 +36,8 @@ pub struct Vessels {
     /// Next child of the same parent, [`NO_PARENT`] for the last.
     next_siblings: Vec<u32>,
     bounds: Option<(Vec3, Vec3)>,
+    /// Positions at rest, while the organ is deformed.
+    rest: Option<Vec<Vec3>>,
 }
 
 impl Vessels {
@@ -50,7 +56,8 @@ impl Vessels {
         vessels
     }
 
-    /// The tree. While the organ grows, it only gets longer and thicker; a restart empties it.
+    /// The tree. While the organ grows, it only gets longer and thicker; a restart empties it. With
+    /// [`FollowsMesh`](crate::plugin::FollowsMesh) its nodes are where the deformed organ has them.
     pub fn tree(&self) -> &VesselTree {
         &self.tree
     }
@@ -67,7 +74,7 @@ impl Vessels {
 
     /// A box that holds every segment, radii included; of no size where there is none.
     ///
-    /// While vessels grow it only becomes larger.
+    /// While vessels grow at rest it only becomes larger.
     pub fn aabb(&self) -> Aabb {
         self.bounds.map_or_else(Aabb::default, |(min, max)| Aabb::from_min_max(min, max))
     }
@@ -110,6 +117,37 @@ impl Vessels {
         self.first_children.clear();
         self.next_siblings.clear();
         self.bounds = None;
+        self.rest = None;
+    }
+
+    /// The tree where it grew, however its organ is deformed.
+    pub(crate) fn tree_at_rest(&self) -> Cow<'_, VesselTree> {
+        let Some(rest) = &self.rest else { return Cow::Borrowed(&self.tree) };
+        let mut tree = self.tree.clone();
+        tree.positions_mut().copy_from_slice(rest);
+        Cow::Owned(tree)
+    }
+
+    /// Moves the nodes with the organ's vertices. Nodes that are not bound yet are bound first.
+    pub(crate) fn deform(&mut self, binding: &mut Binding, vertices: &[Vec3]) -> Result<(), BindingError> {
+        let rest = self.rest.get_or_insert_with(|| self.tree.positions().to_vec());
+        if binding.len() != self.tree.len() {
+            self.tree.positions_mut().copy_from_slice(rest);
+            binding.extend(&self.tree);
+        }
+        binding.follow_into(vertices, self.tree.positions_mut())?;
+        self.bounds = None;
+        (0..self.tree.len()).for_each(|node| self.enclose(node));
+        Ok(())
+    }
+
+    /// Brings the nodes back to where they grew, and says whether they were elsewhere.
+    pub(crate) fn come_to_rest(&mut self) -> bool {
+        let Some(rest) = self.rest.take() else { return false };
+        self.tree.positions_mut().copy_from_slice(&rest);
+        self.bounds = None;
+        (0..self.tree.len()).for_each(|node| self.enclose(node));
+        true
     }
 
     fn append(&mut self, growth: &Growth, system: System, node: usize) {
@@ -133,11 +171,18 @@ impl Vessels {
         self.first_children.push(NO_PARENT);
         self.next_siblings.push(sibling);
         self.birth_steps.push(birth_step);
+        if let Some(rest) = &mut self.rest {
+            rest.push(position);
+        }
         self.enclose(node);
     }
 
     fn update(&mut self, growth: &Growth, system: System, node: usize) {
-        self.tree.positions_mut()[node] = growth.lifted_position(system, NodeId(node as u32));
+        let position = growth.lifted_position(system, NodeId(node as u32));
+        self.tree.positions_mut()[node] = position;
+        if let Some(rest) = &mut self.rest {
+            rest[node] = position;
+        }
         self.tree.radii_mut()[node] = growth.tree(system).radii()[node];
         self.enclose(node);
     }

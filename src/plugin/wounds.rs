@@ -3,7 +3,9 @@
 //! In: [`Cuttable`] on an organ. Out: [`VesselWounds`] on each of its vessel entities, which a regrowth clears.
 
 use crate::plugin::{
+    circulation::CirculationState,
     components::OrganVessels,
+    cutting::CuttableVessels,
     open_ends::OpenEndEntities,
     segment_changes::SegmentChanges,
     vessel_index::VesselIndex,
@@ -15,7 +17,7 @@ use crate::synthesis::{
 };
 use bevy::{
     ecs::{
-        change_detection::DetectChangesMut,
+        change_detection::{DetectChangesMut, ResMut},
         component::Component,
         entity::Entity,
         lifecycle::Remove,
@@ -114,10 +116,14 @@ pub(crate) fn attach_wounds(
     }
 }
 
-/// Cut: vessels that grew anew have no wounds.
-pub(crate) fn clear_outdated(mut vessels: Query<(&Vessels, &mut VesselWounds)>) {
-    for (vessels, mut wounds) in &mut vessels {
+/// Cut and Publish: vessels that grew anew have no wounds.
+pub(crate) fn clear_outdated(
+    mut vessels: Query<(Entity, &Vessels, &mut VesselWounds)>,
+    mut door: ResMut<CuttableVessels>,
+) {
+    for (entity, vessels, mut wounds) in &mut vessels {
         if !wounds.is_of(vessels) {
+            door.bypass_change_detection().forget(entity);
             if wounds.is_empty() {
                 wounds.bypass_change_detection().begin_anew(vessels);
             } else {
@@ -147,17 +153,25 @@ pub(crate) fn follow_settings(
 /// Vessels that are no longer cuttable are whole.
 pub(crate) fn remove_wounds(
     removed: On<Remove, Cuttable>,
-    organs: Query<&OrganVessels>,
+    mut organs: Query<(&OrganVessels, Option<&mut CirculationState>)>,
     mut vessels: Query<(&OpenEndEntities, &mut SegmentChanges)>,
     mut commands: Commands,
 ) {
-    let Ok(entities) = organs.get(removed.entity) else { return };
+    let Ok((entities, circulation)) = organs.get_mut(removed.entity) else { return };
+    if let Some(mut circulation) = circulation {
+        circulation.lay_again();
+    }
     for &entity in entities.entities() {
         let Ok((ends, mut changes)) = vessels.get_mut(entity) else { continue };
         ends.iter().for_each(|(_, end)| commands.entity(end).try_despawn());
         changes.mark_all();
         commands.entity(entity).try_remove::<(VesselWounds, VesselIndex, OpenEndEntities)>();
     }
+}
+
+/// A ledger that is gone can't undo anything.
+pub(crate) fn forget_ledger(removed: On<Remove, VesselWounds>, mut door: ResMut<CuttableVessels>) {
+    door.forget(removed.entity);
 }
 
 /// Number of bifurcations between a segment and its root.
