@@ -2,10 +2,14 @@
 
 mod budget;
 mod changes;
+mod circulation;
+mod cutting;
+mod deformation;
 mod desktop;
 mod entities;
 mod errors;
 mod growth;
+mod theatre;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};
 use bevy_vessels::{

@@ -1,0 +1,89 @@
+//! Organs and instruments for the tests of cutting, bleeding and deformation.
+
+use crate::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_vessels::{
+    plugin::{Cuttable, CuttableVessels, OpenEnd, Perfusion, VesselWounds, VesselsOf},
+    synthesis::{
+        tree::{NO_PARENT, NodeId},
+        units::Scale,
+        wound::Blade,
+    },
+};
+
+/// An app in which each frame lasts as long as is said.
+pub fn theatre(frame: Duration) -> App {
+    let mut app = headless(GrowthBudget::Steps(1000));
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(frame));
+    app
+}
+
+/// An organ with vessels of its own, each a tree for a system, without a mesh.
+pub fn organ_of(app: &mut App, trees: &[(System, &VesselTree)], components: impl Bundle) -> Entity {
+    let organ = app.world_mut().spawn((Transform::default(), Visibility::default(), components)).id();
+    for &(system, tree) in trees {
+        let relations = (ChildOf(organ), VesselsOf(organ));
+        app.world_mut().spawn((relations, VesselSystem(system), Vessels::from_tree(tree, &[])));
+    }
+    app.update();
+    organ
+}
+
+/// A straight vessel along x from 0 to `length`, in `segments`.
+pub fn tube(length: f32, radius: f32, segments: usize) -> VesselTree {
+    let positions = (0..=segments).map(|i| Vec3::X * (length * i as f32 / segments as f32)).collect();
+    let parents = (0..=segments).map(|i| if i == 0 { NO_PARENT } else { i as u32 - 1 }).collect();
+    VesselTree::from_arrays(positions, parents, vec![radius; segments + 1]).expect("a tube is a tree")
+}
+
+/// A stem along x from 0 to 1 that forks there into two branches along ±y of length 1.
+pub fn fork(radius: f32) -> VesselTree {
+    let positions = vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
+    let radii = vec![radius, radius, 0.8 * radius, 0.8 * radius];
+    VesselTree::from_arrays(positions, vec![NO_PARENT, 0, 1, 1], radii).expect("a fork is a tree")
+}
+
+/// Blood in an organ whose unit is a millimetre.
+pub fn blood() -> Perfusion {
+    Perfusion { scale: Scale::MILLIMETRES, ..Perfusion::default() }
+}
+
+/// A square blade of an edge length, across a direction.
+pub fn square(center: Vec3, normal: Vec3, size: f32) -> Blade {
+    let half = 0.5 * size * normal.any_orthonormal_vector();
+    Blade::rectangle(center, half, normal.normalize().cross(half)).expect("a square has an area")
+}
+
+pub fn operate(app: &mut App, operation: impl FnOnce(&mut CuttableVessels)) {
+    operation(&mut app.world_mut().resource_mut::<CuttableVessels>());
+    app.update();
+}
+
+pub fn cut(app: &mut App, blade: Blade) {
+    operate(app, |vessels| vessels.cut(blade));
+}
+
+pub fn wounds(world: &World, organ: Entity, system: System) -> &VesselWounds {
+    let vessels = vessel_entity(world, organ, system).expect("the system has vessels");
+    world.get::<VesselWounds>(vessels).expect("the vessels can be cut")
+}
+
+pub fn severed(world: &World, organ: Entity, system: System) -> Vec<NodeId> {
+    wounds(world, organ, system).severed_segments().collect()
+}
+
+/// All open ends, in the order of systems and ids.
+pub fn open_ends(app: &mut App) -> Vec<OpenEnd> {
+    let mut ends: Vec<OpenEnd> = app.world_mut().query::<&OpenEnd>().iter(app.world()).copied().collect();
+    ends.sort_by_key(|end| (end.organ, end.system, end.id));
+    ends
+}
+
+/// A quick growth that can be cut, grown to its end.
+pub fn grown(app: &mut App, components: impl Bundle) -> Entity {
+    let organ = spawn(app, quick());
+    app.world_mut().entity_mut(organ).insert((Cuttable::default(), components));
+    run_to_phase(app, organ, GrowthPhase::Finished);
+    (0..2).for_each(|_| app.update());
+    organ
+}
