@@ -21,7 +21,8 @@
 //! ([`instances`](synthesis::instances)) or written ([`io`](synthesis::io)).
 //!
 //! - [`synthesis`] makes vessels and knows no engine. Use it alone, without default features, for batches of organs.
-//! - [`plugin`] brings it into a world: components, a time budget for each frame, messages.
+//! - [`plugin`] brings it into a world: components, a time budget for each frame, messages. There vessels can be cut and
+//!   bleed, too: see [`Cuttable`](plugin::Cuttable) and [`Perfusion`](plugin::Perfusion).
 //! - [`render`] draws the segments by instancing while they grow.
 //!
 //! # Units
@@ -45,6 +46,11 @@
 //! alone; the time budget only decides how many steps a frame takes.
 //!
 //! **My organ is in millimetres.** Nothing to do: see Units.
+//!
+//! **My organ bleeds by the litre, or not at all.** Blood has a size: say how long a unit of the mesh is, in
+//! [`Perfusion::scale`](plugin::Perfusion::scale).
+//!
+//! **My organ is a soft body.** Put [`FollowsMesh`](plugin::FollowsMesh) on it, and its vessels follow.
 //!
 //! **Why does nothing grow?** Look at the entity's [`GrowthProgress`](plugin::GrowthProgress) and the log: a mesh that
 //! cannot be used, or settings outside their limits, are named there with what to change.

@@ -3,6 +3,9 @@
 //! In: an entity with a `Mesh3d` and a [`Vasculature`]. Out: a vessel entity per system, child of the organ, with the
 //! tree in [`Vessels`] and what changed in [`SegmentChanges`]; the state of things in [`GrowthProgress`] and messages.
 //!
+//! What goes beyond growth is asked for by components on the organ: [`Cuttable`] for surgery through [`CuttableVessels`],
+//! [`Perfusion`] for blood, [`FollowsMesh`] for soft bodies. An organ without them pays nothing for them.
+//!
 //! ```text
 //! Source      commands, wishes, mesh assets ─► tissue (in the task pool) ─► growth, started
 //! Grow        steps, one organ after the other, within the GrowthBudget
@@ -11,6 +14,7 @@
 //! Publish     new and changed nodes ─► Vessels, SegmentChanges, Aabb; diagnostics
 //! ```
 
+mod bleeding;
 mod circulation;
 mod commands;
 mod components;
@@ -106,24 +110,9 @@ impl Default for GrowthPlugin {
 
 impl Plugin for GrowthPlugin {
     fn build(&self, app: &mut App) {
-        app.insert_resource(self.budget)
-            .init_resource::<GrowthFrame>()
-            .add_message::<GrowthCommand>()
-            .add_message::<GrowthStarted>()
-            .add_message::<GrowthFinished>()
-            .add_message::<GrowthFailed>()
-            .init_resource::<CuttableVessels>()
-            .add_message::<VesselCommand>()
-            .add_message::<VesselOperation>()
-            .add_message::<VesselOperationFailed>()
-            .add_message::<BleedingStarted>()
-            .add_message::<BleedingStopped>()
-            .add_message::<CirculationFailed>()
-            .add_observer(publish::remove_vessels)
-            .add_observer(wounds::remove_wounds)
-            .add_observer(wounds::forget_ledger)
-            .add_observer(circulation::remove_circulation)
-            .add_observer(deformation::release_vessels);
+        app.insert_resource(self.budget).init_resource::<GrowthFrame>().init_resource::<CuttableVessels>();
+        add_messages(app);
+        add_observers(app);
         diagnostics::register(app);
         app.configure_sets(
             self.schedule,
@@ -136,46 +125,9 @@ impl Plugin for GrowthPlugin {
             )
                 .chain(),
         );
-        app.add_systems(
-            self.schedule,
-            (
-                (
-                    tissue_source::obey_commands,
-                    tissue_source::notice_changes,
-                    tissue_source::begin,
-                    deformation::take_rest,
-                    tissue_source::receive_tissues,
-                )
-                    .chain()
-                    .in_set(VesselSystems::Source),
-                (growth::grow, growth::end_growths).chain().in_set(VesselSystems::Grow),
-                (
-                    wounds::attach_wounds,
-                    wounds::clear_outdated,
-                    wounds::follow_settings,
-                    vessel_index::index_vessels,
-                    cutting::carry_out,
-                    open_ends::spawn_open_ends,
-                )
-                    .chain()
-                    .in_set(VesselSystems::Cut),
-                (circulation::prepare_organs, circulation::make_flow, circulation::bleed, supply::measure_supply)
-                    .chain()
-                    .in_set(VesselSystems::Circulate),
-                (
-                    publish::publish_vessels,
-                    wounds::clear_outdated,
-                    open_ends::spawn_open_ends,
-                    deformation::attach_bindings,
-                    deformation::follow_meshes,
-                    open_ends::move_open_ends,
-                    publish::show_systems,
-                    diagnostics::measure,
-                )
-                    .chain()
-                    .in_set(VesselSystems::Publish),
-            ),
-        );
+        add_growth_systems(app, self.schedule);
+        add_surgery_systems(app, self.schedule);
+        add_publish_systems(app, self.schedule);
     }
 
     fn finish(&self, app: &mut App) {
@@ -185,6 +137,70 @@ impl Plugin for GrowthPlugin {
     }
 }
 
+fn add_messages(app: &mut App) {
+    app.add_message::<GrowthCommand>()
+        .add_message::<GrowthStarted>()
+        .add_message::<GrowthFinished>()
+        .add_message::<GrowthFailed>()
+        .add_message::<VesselCommand>()
+        .add_message::<VesselOperation>()
+        .add_message::<VesselOperationFailed>()
+        .add_message::<BleedingStarted>()
+        .add_message::<BleedingStopped>()
+        .add_message::<CirculationFailed>();
+}
+
+fn add_observers(app: &mut App) {
+    app.add_observer(publish::remove_vessels)
+        .add_observer(wounds::remove_wounds)
+        .add_observer(wounds::forget_ledger)
+        .add_observer(circulation::remove_circulation)
+        .add_observer(deformation::release_vessels);
+}
+
+fn add_growth_systems(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
+    let source = (
+        tissue_source::obey_commands,
+        tissue_source::notice_changes,
+        tissue_source::begin,
+        deformation::take_rest,
+        tissue_source::receive_tissues,
+    );
+    let grow = (growth::grow, growth::end_growths);
+    app.add_systems(schedule, (source.chain().in_set(VesselSystems::Source), grow.chain().in_set(VesselSystems::Grow)));
+}
+
+fn add_surgery_systems(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
+    let cut = (
+        wounds::attach_wounds,
+        wounds::clear_outdated,
+        wounds::follow_settings,
+        vessel_index::index_vessels,
+        cutting::carry_out,
+        open_ends::spawn_open_ends,
+    );
+    let circulate = (circulation::prepare_organs, circulation::make_flow, bleeding::bleed, supply::measure_supply);
+    app.add_systems(
+        schedule,
+        (cut.chain().in_set(VesselSystems::Cut), circulate.chain().in_set(VesselSystems::Circulate)),
+    );
+}
+
+fn add_publish_systems(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
+    let publish = (
+        publish::publish_vessels,
+        // Whoever looks after this frame sees no wounds of vessels that are gone.
+        wounds::clear_outdated,
+        open_ends::spawn_open_ends,
+        deformation::attach_bindings,
+        deformation::follow_meshes,
+        open_ends::move_open_ends,
+        publish::show_systems,
+        diagnostics::measure,
+    );
+    app.add_systems(schedule, publish.chain().in_set(VesselSystems::Publish));
+}
+
 /// What happens to vessels in a frame, in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VesselSystems {
@@ -192,10 +208,11 @@ pub enum VesselSystems {
     Source,
     /// Growths step.
     Grow,
-    /// Vessels are cut, clamped and cauterised.
+    /// Vessels are cut, clamped, sealed and healed, as [`CuttableVessels`] and [`VesselCommand`]s ask, where they were
+    /// published last. Ask before this, and what you ask for is done in the same frame.
     Cut,
     /// Blood flows, and is lost.
     Circulate,
-    /// Vessel entities are brought up to date.
+    /// Vessel entities are brought up to date, and follow meshes that were deformed before this.
     Publish,
 }

@@ -16,14 +16,12 @@ use crate::synthesis::{
 use bevy::{
     camera::visibility::Visibility,
     ecs::{
-        change_detection::DetectChanges,
         component::Component,
         entity::Entity,
         hierarchy::ChildOf,
         query::{Changed, Or},
         reflect::ReflectComponent,
         system::{Commands, Query},
-        world::Ref,
     },
     math::Vec3,
     reflect::Reflect,
@@ -35,6 +33,24 @@ use std::collections::BTreeMap;
 ///
 /// The entity's `Transform` is at the end's tip and faces out of the lumen (its forward direction), in the space of the
 /// organ's mesh. Blood leaves it only where the organ has a [`Perfusion`](crate::plugin::Perfusion).
+///
+/// A particle system, on the CPU or the GPU, needs these entities and no more: emit [`flow`](Self::flow) times the frame's
+/// duration at the `GlobalTransform`, with [`velocity`](Self::velocity) along its forward direction. An entity comes with
+/// its end and goes when that is closed; the rest is told by [`BleedingStarted`](crate::plugin::BleedingStarted) and
+/// [`BleedingStopped`](crate::plugin::BleedingStopped).
+///
+/// ```
+/// # use bevy_vessels::plugin::OpenEnd;
+/// # use bevy::prelude::{GlobalTransform, Query, Res, Time, Vec3};
+/// fn emit(time: Res<Time>, ends: Query<(&OpenEnd, &GlobalTransform)>) {
+///     for (end, place) in &ends {
+///         let millilitres = end.flow.ml_per_min() / 60.0 * time.delta_secs_f64();
+///         let (from, speed): (Vec3, Vec3) = (place.translation(), end.velocity as f32 * place.forward());
+/// #       let _ = (millilitres, from, speed);
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(emit);
+/// ```
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, PartialEq)]
 #[require(Transform, Visibility)]
@@ -144,7 +160,7 @@ pub(crate) fn spawn_open_ends(
 
 /// Publish: open ends move with their vessels.
 pub(crate) fn move_open_ends(
-    vessels: Query<(Ref<Vessels>, &VesselWounds, &OpenEndEntities), Or<(Changed<Vessels>, Changed<VesselWounds>)>>,
+    vessels: Query<(&Vessels, &VesselWounds, &OpenEndEntities), Or<(Changed<Vessels>, Changed<VesselWounds>)>>,
     mut ends: Query<(&mut OpenEnd, &mut Transform)>,
 ) {
     for (vessels, wounds, entities) in vessels.iter().filter(|(vessels, wounds, _)| wounds.is_of(vessels)) {
@@ -160,7 +176,7 @@ pub(crate) fn move_open_ends(
                 radius: now.radius,
                 ..*end
             };
-            if *end != moved || vessels.is_added() {
+            if *end != moved {
                 *end = moved;
                 *transform = OpenEnd::pose(&now);
             }

@@ -16,7 +16,8 @@ use bevy::{
 /// is cut open bleeds.
 ///
 /// Blood flows once the vessels have grown; those of fewer than 8192 nodes while they grow, too. As long as nothing is
-/// open it costs nothing. A change of a setting takes effect at the next frame: what is open goes on bleeding.
+/// open it costs nothing. A change of a setting takes effect at the next frame: what is open goes on bleeding, but other
+/// settings of the bleeding begin the clotting anew. Of several vessel entities of one system the first has blood.
 ///
 /// Flow is that of the organ at rest: neither its transform nor its deformation changes it.
 ///
@@ -113,7 +114,7 @@ impl Default for Perfusion {
 /// The blood of one patient: whose loss lowers the pressure in all organs.
 ///
 /// Put it on an organ, or on an entity above several organs, which then share it. An organ that finds none on itself or
-/// above gets one of its own, with the default settings.
+/// above gets one of its own, with the default settings. To fill a patient up again, insert a new one.
 #[derive(Component, Clone, Copy, Debug, PartialEq)]
 pub struct Patient {
     pub(crate) blood: BloodVolume,
@@ -140,7 +141,8 @@ impl Default for Patient {
     }
 }
 
-/// What an organ bleeds. For reading: the plugin writes it.
+/// What an organ bleeds. For reading: the plugin writes it, and goes on from what it finds, so that inserting a new one
+/// begins the count anew.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct BloodLoss {

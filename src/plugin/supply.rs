@@ -124,6 +124,10 @@ pub(crate) fn measure_supply(
     meshes: Option<Res<Assets<Mesh>>>,
 ) {
     for mut organ in &mut organs {
+        if !organ.state.gauge.is_ready {
+            organ.clear(&mut vessels);
+            continue;
+        }
         let outcome = if organ.state.gauge.is_to_begin(organ.perfusion.supply_interval) {
             let patient = patient_of(organ.entity, &parents, |entity| patients.contains(entity));
             let patient = patient.and_then(|patient| patients.get(patient).ok()).copied().unwrap_or_default();
@@ -166,6 +170,15 @@ impl SuppliedItem<'_, '_> {
         let mesh = self.mesh.zip(meshes).and_then(|(mesh, meshes)| meshes.get(mesh.id()));
         mesh.and_then(vertex_positions)
             .map_or_else(Vec::new, |positions| positions.iter().map(|&at| at.into()).collect())
+    }
+
+    /// Nothing is known of vessels that grow.
+    fn clear(&mut self, vessels: &mut Query<(&VesselSystem, &mut SegmentSupply)>) {
+        self.supply.set_if_neq(OrganSupply::default());
+        let mut vessels = vessels.iter_many_mut(self.vessels.entities());
+        while let Some((_, mut supply)) = vessels.fetch_next() {
+            supply.set_if_neq(SegmentSupply::default());
+        }
     }
 
     fn accept(&mut self, outcome: Outcome, vessels: &mut Query<(&VesselSystem, &mut SegmentSupply)>) {

@@ -70,9 +70,8 @@ fn an_action_goes_to_all_organs_or_to_the_one_that_it_names() {
     cut(&mut app, blade.clone());
     let done: Vec<VesselOperation> = drain(app.world(), &mut messages);
     assert_eq!(done.len(), 6, "two systems of three organs");
-    for (operation, organ) in done.iter().zip(organs.iter().flat_map(|organ| [organ; 2])) {
-        assert_eq!((operation.organ, operation.kind, operation.report.severed), (*organ, OperationKind::Cut, 1));
-    }
+    assert!(done.iter().all(|operation| (operation.kind, operation.report.severed) == (OperationKind::Cut, 1)));
+    assert!(organs.iter().all(|organ| done.iter().filter(|operation| operation.organ == *organ).count() == 2));
     operate(&mut app, |vessels| vessels.request(VesselCommand::new(VesselAction::UndoAll).on(organs[1])));
     let is_whole = |app: &App, organ| severed(app.world(), organ, System::Venous).is_empty();
     assert_eq!(organs.map(|organ| is_whole(&app, organ)), [false, true, false]);

@@ -5,7 +5,7 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_vessels::{
     plugin::{Cuttable, CuttableVessels, OpenEnd, Perfusion, VesselWounds, VesselsOf},
     synthesis::{
-        tree::{NO_PARENT, NodeId},
+        tree::{NO_PARENT, NodeId, Place},
         units::Scale,
         wound::Blade,
     },
@@ -50,8 +50,18 @@ pub fn blood() -> Perfusion {
 
 /// A square blade of an edge length, across a direction.
 pub fn square(center: Vec3, normal: Vec3, size: f32) -> Blade {
+    let normal = normal.normalize();
     let half = 0.5 * size * normal.any_orthonormal_vector();
-    Blade::rectangle(center, half, normal.normalize().cross(half)).expect("a square has an area")
+    Blade::rectangle(center, half, normal.cross(half)).expect("a square has an area")
+}
+
+/// Clamps all segments that leave a root.
+pub fn clamp_roots(app: &mut App, organ: Entity, system: System) {
+    let entity = vessel_entity(app.world(), organ, system).expect("the system has vessels");
+    let tree = published(app.world(), organ, system).tree().clone();
+    let first = tree.segments().filter(|&(_, parent)| tree.parents()[parent] == NO_PARENT);
+    let first: Vec<NodeId> = first.map(|(node, _)| NodeId(node as u32)).collect();
+    operate(app, |vessels| first.iter().for_each(|&node| vessels.clamp_at(entity, Place::new(node, 0.5))));
 }
 
 pub fn operate(app: &mut App, operation: impl FnOnce(&mut CuttableVessels)) {
