@@ -118,7 +118,8 @@ fn any_file() -> AssetPlugin {
     AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() }
 }
 
-fn has_display() -> bool {
+/// Whether a window can be opened.
+pub fn has_display() -> bool {
     !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 
