@@ -5,6 +5,7 @@
 //! will do: each frame begins when the last one has been drawn. One camera, one light with shadows in four cascades; the
 //! vessels are far away, so that a software driver has little to draw, but all chunks are drawn in all views.
 
+#[expect(dead_code, reason = "no pictures are written here")]
 #[path = "../examples/common/headless.rs"]
 mod headless;
 
