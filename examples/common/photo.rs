@@ -41,8 +41,7 @@ pub struct PhotoPlugin;
 
 impl Plugin for PhotoPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Shots>()
-            .init_resource::<Session>()
+        app.init_resource::<Session>()
             .add_systems(Update, (give_up, grow.run_if(not(grown)), photograph.run_if(grown)).chain());
     }
 }

@@ -1,9 +1,9 @@
 //! Keeps the chunks of every vessel entity, their boxes and their buffer up to date with its tree.
 
 use super::{
-    SegmentLimits, SegmentTemplate,
+    SegmentLimits,
+    detail::{ChunkMeshes, FEWEST_SLOTS},
     material::{SegmentExtension, SegmentMaterial, VesselMaterials},
-    template::SEGMENTS_PER_CHUNK,
     upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
@@ -17,7 +17,7 @@ use bevy::{
     asset::RenderAssetUsages,
     camera::{primitives::Aabb, visibility::NoAutoAabb},
     ecs::{query::QueryData, system::SystemParam},
-    math::bounding::Aabb3d,
+    math::bounding::{Aabb3d, BoundingVolume},
     mesh::MeshTag,
     prelude::*,
     render::storage::ShaderBuffer,
@@ -33,8 +33,12 @@ pub struct SegmentBuffer {
     material: Handle<SegmentMaterial>,
     /// Segments that the buffer has room for.
     capacity: usize,
+    /// Slots that may hold something else than hidden segments.
+    written: usize,
     /// Chunk entities, in the order of their slots.
     chunks: Vec<Entity>,
+    /// What is in each chunk.
+    contents: Vec<ChunkContents>,
     colors: SegmentColors,
     /// The appearance that `colors` follow, `None` at first.
     look: Option<Look>,
@@ -65,9 +69,42 @@ impl SegmentBuffer {
     }
 }
 
-/// Marks an entity that draws one chunk of segments.
+/// An entity that draws one chunk of segments. For reading: its mesh follows its size in the picture.
 #[derive(Component, Debug)]
-pub struct SegmentChunk;
+pub struct SegmentChunk {
+    /// Radius of the thickest segment, in the local space of the vessel entity.
+    pub(super) thickest: f32,
+    /// Slots that its mesh must have.
+    pub(super) slots: usize,
+    /// Its level of detail.
+    pub(super) level: usize,
+    /// Level and slots of the mesh that it has.
+    pub(super) drawn: (usize, usize),
+}
+
+impl SegmentChunk {
+    /// Level of detail, 0 for the finest. Each further one has fewer corners, or fewer segments.
+    pub fn level(&self) -> usize {
+        self.level
+    }
+}
+
+/// What a chunk's box and thickness follow from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct ChunkContents {
+    bounds: Option<Aabb3d>,
+    thickest: f32,
+}
+
+impl ChunkContents {
+    /// Takes in segments within a box. While vessels grow, what they were before lies within what they are now.
+    fn add(&mut self, bounds: Option<Aabb3d>, segments: &[SegmentInstance]) {
+        let Some(new) = bounds else { return };
+        self.bounds = Some(self.bounds.map_or(new, |old| old.merge(&new)));
+        let radii = segments.iter().map(|segment| segment.start_radius.max(segment.end_radius));
+        self.thickest = radii.fold(self.thickest, f32::max);
+    }
+}
 
 /// What decides the colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,7 +141,7 @@ pub(super) fn attach_buffers(
     mut materials: ResMut<Assets<SegmentMaterial>>,
 ) {
     for (entity, system) in &new {
-        let capacity = SEGMENTS_PER_CHUNK;
+        let capacity = FEWEST_SLOTS;
         let mut buffer = ShaderBuffer::with_size(capacity * SegmentInstance::SIZE, RenderAssetUsages::default());
         buffer.buffer_description.label = Some("vessel segments");
         let buffer = buffers.add(buffer);
@@ -114,7 +151,9 @@ pub(super) fn attach_buffers(
             buffer,
             material,
             capacity,
+            written: 0,
             chunks: Vec::new(),
+            contents: Vec::new(),
             colors: SegmentColors::Uniform([1.0; 3]),
             look: None,
             warned_of_limit: false,
@@ -136,11 +175,12 @@ pub(super) fn detach_buffer(removed: On<Remove, Vessels>, mut commands: Commands
 #[derive(SystemParam)]
 pub(super) struct SegmentStore<'w, 's> {
     commands: Commands<'w, 's>,
-    boxes: Query<'w, 's, &'static mut Aabb, With<SegmentChunk>>,
+    drawn: Query<'w, 's, (&'static mut Aabb, &'static mut SegmentChunk)>,
     buffers: ResMut<'w, Assets<ShaderBuffer>>,
     materials: ResMut<'w, Assets<SegmentMaterial>>,
+    meshes: ResMut<'w, Assets<Mesh>>,
     writes: ResMut<'w, SegmentWrites>,
-    template: Res<'w, SegmentTemplate>,
+    templates: ResMut<'w, ChunkMeshes>,
     limits: Res<'w, SegmentLimits>,
 }
 
@@ -173,36 +213,30 @@ pub(super) fn update_segments(
             None => Look::new(&VesselAppearance::default(), drawn.system.0),
         };
         let len = store.drawable(drawn.entity, drawn.vessels.tree().len(), &mut drawn.segments);
-        let dirty = drawn.segments.dirty_chunks(drawn.vessels, &drawn.changes, look, len);
+        let changes = drawn.changes.bypass_change_detection();
+        drawn.segments.adopt(look, drawn.vessels, changes);
         store.resize(&mut drawn.segments, len);
-        store.write(drawn.entity, drawn.vessels, &mut drawn.segments, &dirty, len);
-        drawn.changes.bypass_change_detection().clear();
+        store.write(drawn.vessels, changes, &mut drawn.segments, len);
+        store.fit_chunks(drawn.entity, &mut drawn.segments, len);
+        changes.clear();
     }
 }
 
 impl SegmentBuffer {
-    /// Adopts the look and returns the chunks to be written, rising, all within `len` nodes.
-    fn dirty_chunks(&mut self, vessels: &Vessels, changes: &SegmentChanges, look: Look, len: usize) -> Vec<usize> {
+    /// Adopts the look, and marks the segments that have another colour now.
+    fn adopt(&mut self, look: Look, vessels: &Vessels, changes: &mut SegmentChanges) {
         let (tree, births) = (vessels.tree(), vessels.birth_steps());
         if self.look != Some(look) {
             self.look = Some(look);
             self.colors = look.colors();
             self.colors.refresh(tree, births, [0..tree.len()]);
-            return (0..len.div_ceil(SEGMENTS_PER_CHUNK)).collect();
+            changes.mark_all();
+            return;
         }
-        let recolored = self.colors.refresh(tree, births, changes.dirty_ranges(tree.len()));
-        let ranges = changes.dirty_ranges(len).chain(recolored);
-        let mut chunks: Vec<usize> = ranges.flat_map(|range| chunks_of(range, len)).collect();
-        chunks.sort_unstable();
-        chunks.dedup();
-        chunks
+        for recolored in self.colors.refresh(tree, births, changes.dirty_ranges(tree.len())) {
+            recolored.for_each(|node| changes.mark_node(node));
+        }
     }
-}
-
-/// The chunks that nodes of a range are in.
-fn chunks_of(range: Range<usize>, len: usize) -> Range<usize> {
-    let end = range.end.min(len);
-    if range.start >= end { 0..0 } else { range.start / SEGMENTS_PER_CHUNK..end.div_ceil(SEGMENTS_PER_CHUNK) }
 }
 
 impl SegmentStore<'_, '_> {
@@ -231,41 +265,75 @@ impl SegmentStore<'_, '_> {
                 material.extension.segments = segments.buffer.clone();
             }
         }
-        let needed = len.div_ceil(SEGMENTS_PER_CHUNK);
+        let needed = len.div_ceil(self.templates.slots());
+        segments.contents.resize(needed, ChunkContents::default());
         for chunk in segments.chunks.drain(needed.min(segments.chunks.len())..) {
             self.commands.entity(chunk).try_despawn();
         }
     }
 
-    /// Queues the chunks' segments, neighbours as one write, and fits their boxes.
-    fn write(&mut self, entity: Entity, vessels: &Vessels, segments: &mut SegmentBuffer, dirty: &[usize], len: usize) {
-        for run in dirty.chunk_by(|a, b| a + 1 == *b) {
-            let mut written = vec![SegmentInstance::HIDDEN; run.len() * SEGMENTS_PER_CHUNK];
-            for (&chunk, out) in run.iter().zip(written.chunks_exact_mut(SEGMENTS_PER_CHUNK)) {
-                let nodes = chunk * SEGMENTS_PER_CHUNK..((chunk + 1) * SEGMENTS_PER_CHUNK).min(len);
-                let bounds = write_segments(vessels.tree(), vessels.birth_steps(), nodes, &segments.colors, out);
-                self.fit_chunk(entity, segments, chunk, bounds);
-            }
-            let (buffer, first) = (segments.buffer.clone(), run[0] * SEGMENTS_PER_CHUNK);
-            self.writes.0.push(SegmentWrite { buffer, first, segments: written });
+    /// Queues the segments that changed, and takes them into their chunks.
+    fn write(&mut self, vessels: &Vessels, changes: &SegmentChanges, segments: &mut SegmentBuffer, len: usize) {
+        let slots = self.templates.slots();
+        if changes.is_all() {
+            segments.contents.fill(ChunkContents::default());
         }
+        let mut write = SegmentWrite::new(segments.buffer.clone());
+        for range in changes.dirty_ranges(len) {
+            for nodes in split(range, slots) {
+                let (chunk, first) = (nodes.start / slots, write.len());
+                let out = write.extend(nodes.clone());
+                let bounds = write_segments(vessels.tree(), vessels.birth_steps(), nodes, &segments.colors, out);
+                segments.contents[chunk].add(bounds, write.added_since(first));
+            }
+        }
+        // what a longer tree left behind
+        write.extend(len..segments.written.max(len));
+        segments.written = len;
+        self.writes.push(write);
     }
 
-    /// Puts the box around a chunk, spawning the chunk when it is the next one.
-    fn fit_chunk(&mut self, entity: Entity, segments: &mut SegmentBuffer, chunk: usize, bounds: Option<Aabb3d>) {
-        let aabb = bounds.map_or_else(Aabb::default, |b| Aabb::from_min_max(b.min.into(), b.max.into()));
-        if chunk < segments.chunks.len() {
-            if let Ok(mut current) = self.boxes.get_mut(segments.chunks[chunk]) {
-                current.set_if_neq(aabb);
+    /// Gives chunks that changed their boxes, and spawns those that are missing.
+    fn fit_chunks(&mut self, entity: Entity, segments: &mut SegmentBuffer, len: usize) {
+        let full = self.templates.slots();
+        for (chunk, contents) in segments.contents.iter().enumerate() {
+            let aabb = contents.bounds.map_or_else(Aabb::default, |b| Aabb::from_min_max(b.min.into(), b.max.into()));
+            let used = (len - chunk * full).min(full);
+            let (thickest, slots) = (contents.thickest, used.next_power_of_two().clamp(FEWEST_SLOTS, full));
+            if let Some(&known) = segments.chunks.get(chunk) {
+                if let Ok((mut current, mut chunk)) = self.drawn.get_mut(known) {
+                    current.set_if_neq(aabb);
+                    (chunk.thickest, chunk.slots) = (thickest, slots);
+                }
+                continue;
             }
-            return;
+            let drawing = (
+                Mesh3d(self.templates.mesh(0, slots, &mut self.meshes)),
+                MeshMaterial3d(segments.material.clone()),
+                MeshTag((chunk * full) as u32),
+            );
+            let drawn = SegmentChunk { thickest, slots, level: 0, drawn: (0, slots) };
+            segments.chunks.push(self.commands.spawn((drawing, drawn, aabb, NoAutoAabb, ChildOf(entity))).id());
         }
-        let drawing = (
-            Mesh3d(self.template.0.clone()),
-            MeshMaterial3d(segments.material.clone()),
-            MeshTag((chunk * SEGMENTS_PER_CHUNK) as u32),
-        );
-        let spawned = self.commands.spawn((drawing, SegmentChunk, aabb, NoAutoAabb, ChildOf(entity)));
-        segments.chunks.push(spawned.id());
+    }
+}
+
+/// The parts of a range that lie in one chunk each.
+fn split(range: Range<usize>, slots: usize) -> impl Iterator<Item = Range<usize>> {
+    let chunks = if range.is_empty() { 0..0 } else { range.start / slots..range.end.div_ceil(slots) };
+    chunks.map(move |chunk| range.start.max(chunk * slots)..range.end.min((chunk + 1) * slots))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_split_where_chunks_meet() {
+        let parts = |range: Range<usize>| split(range, 4).collect::<Vec<_>>();
+        assert_eq!(parts(1..3), [1..3]);
+        assert_eq!(parts(0..4), [0..4]);
+        assert_eq!(parts(3..9), [3..4, 4..8, 8..9]);
+        assert_eq!(parts(4..4), [0..0; 0]);
     }
 }
