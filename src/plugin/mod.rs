@@ -167,7 +167,14 @@ fn add_growth_systems(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
         tissue_source::receive_tissues,
     );
     let grow = (growth::grow, growth::end_growths);
-    app.add_systems(schedule, (source.chain().in_set(VesselSystems::Source), grow.chain().in_set(VesselSystems::Grow)));
+    app.add_systems(
+        schedule,
+        (
+            growth::begin_frame.before(VesselSystems::Source),
+            source.chain().in_set(VesselSystems::Source),
+            grow.chain().in_set(VesselSystems::Grow),
+        ),
+    );
 }
 
 fn add_surgery_systems(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
