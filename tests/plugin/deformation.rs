@@ -17,7 +17,7 @@ fn edit_mesh(app: &mut App, organ: Entity, edit: impl FnOnce(&mut Mesh)) {
 fn move_vertices(app: &mut App, organ: Entity, to: impl Fn(Vec3) -> Vec3) {
     edit_mesh(app, organ, |mesh| {
         let positions =
-            mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(|values| values.as_float3()).unwrap().to_vec();
+            mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(|values| values.as_float3()).expect("positions").to_vec();
         let moved: Vec<[f32; 3]> = positions.iter().map(|&at| to(Vec3::from(at)).to_array()).collect();
         mesh.insert_attribute(Mesh::ATTRIBUTE_POSITION, moved);
     });
