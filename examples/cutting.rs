@@ -15,11 +15,11 @@
 //! `--mesh FILE.glb` takes an organ of your own, in metres. `--headless --script demo --out DIR` makes the same cut, clamp
 //! and cautery on any machine and writes pictures and `blood_loss.csv`, as it does where there is no display.
 
-mod common;
 #[path = "common/blood.rs"]
 mod blood;
 #[path = "common/breathing.rs"]
 mod breathing;
+mod common;
 #[path = "common/figures.rs"]
 mod figures;
 #[path = "common/instruments.rs"]

@@ -18,12 +18,12 @@ fn any_point(rng: &mut VesselRng) -> Vec3 {
 fn chain(points: Vec<Vec3>) -> VesselTree {
     let parents = (0..points.len() as u32).map(|node| node.checked_sub(1).unwrap_or(NO_PARENT)).collect();
     let radii = vec![0.01; points.len()];
-    VesselTree::from_arrays(points, parents, radii).unwrap()
+    VesselTree::from_arrays(points, parents, radii).expect("a tree")
 }
 
 fn organs() -> [TriangleMesh; 2] {
-    let colon = ColonSettings::default().generate().unwrap().mesh.triangle_mesh().unwrap();
-    let liver = LiverSettings::default().generate().unwrap().mesh.triangle_mesh().unwrap();
+    let colon = ColonSettings::default().generate().expect("a colon").mesh.triangle_mesh().expect("a mesh");
+    let liver = LiverSettings::default().generate().expect("a liver").mesh.triangle_mesh().expect("a mesh");
     [colon, liver]
 }
 
@@ -215,7 +215,7 @@ fn cube(n: u32) -> TetMesh {
             tetrahedra.push([path[0], path[1], path[2], path[3]]);
         }
     }
-    TetMesh::new(positions, tetrahedra).unwrap()
+    TetMesh::new(positions, tetrahedra).expect("tetrahedra")
 }
 
 #[test]

@@ -59,20 +59,22 @@ fn arrays(shape: Shape, nodes: usize, seed: u64) -> (Vec<Vec3>, Vec<u32>, Vec<f3
 
 fn tree(shape: Shape, nodes: usize, seed: u64) -> VesselTree {
     let (positions, parents, radii) = arrays(shape, nodes, seed);
-    VesselTree::from_arrays(positions, parents, radii).unwrap()
+    VesselTree::from_arrays(positions, parents, radii).expect("a tree")
 }
 
 /// The first nodes of a tree.
 fn beginning(tree: &VesselTree, nodes: usize) -> VesselTree {
     let (positions, parents, radii) = (tree.positions(), tree.parents(), tree.radii());
-    VesselTree::from_arrays(positions[..nodes].to_vec(), parents[..nodes].to_vec(), radii[..nodes].to_vec()).unwrap()
+    VesselTree::from_arrays(positions[..nodes].to_vec(), parents[..nodes].to_vec(), radii[..nodes].to_vec())
+        .expect("a tree")
 }
 
 /// The tree bent about the y axis, twisted, and with other radii.
 fn bent(tree: &VesselTree) -> VesselTree {
     let bend = |p: &Vec3| Vec3::new(p.x + 0.4 * p.y * p.y, p.y - 0.3 * p.x * p.z, 0.6 * p.z + 0.2 * p.x);
     let radii = tree.radii().iter().enumerate().map(|(i, r)| r * (0.5 + (i % 7) as f32 * 0.2)).collect();
-    VesselTree::from_arrays(tree.positions().iter().map(bend).collect(), tree.parents().to_vec(), radii).unwrap()
+    VesselTree::from_arrays(tree.positions().iter().map(bend).collect(), tree.parents().to_vec(), radii)
+        .expect("a tree")
 }
 
 fn ends(tree: &VesselTree, node: usize, parent: usize) -> [(DVec3, f64); 2] {
@@ -126,8 +128,8 @@ fn brute_nearest(tree: &VesselTree, point: Vec3) -> Option<f64> {
 fn check_nearest(tree: &VesselTree, index: &SegmentIndex, rng: &mut VesselRng, what: &str) {
     for _ in 0..60 {
         let point = 1.3 * any_point(rng);
-        let expected = brute_nearest(tree, point).unwrap();
-        let (place, distance) = index.nearest(tree, point, f32::INFINITY).unwrap();
+        let expected = brute_nearest(tree, point).expect("a segment");
+        let (place, distance) = index.nearest(tree, point, f32::INFINITY).expect("a segment");
         assert!((f64::from(distance) - expected).abs() <= 1e-6 * expected.max(1.0), "{what}: {distance} {expected}");
         assert!((0.0..=1.0).contains(&place.along));
         let there = tree.position_at(place).distance(point);

@@ -1,6 +1,7 @@
 //! The same organ in any unit grows the same vessels.
 
-mod common;
+#[path = "common/torus.rs"]
+mod torus;
 
 use bevy_vessels::synthesis::{
     colonization::{ColonizationSettings, Growth},
@@ -24,7 +25,7 @@ fn grown(mesh: &TriangleMesh, factor: f32, mode: TissueMode, seed: u64) -> Growt
 /// 0.2 m, the same in millimetres, and sizes between them.
 #[test]
 fn metres_millimetres_and_units_grow_the_same_vessels() {
-    let mesh = common::torus();
+    let mesh = torus::torus();
     for mode in [TissueMode::Surface, TissueMode::Volume] {
         for seed in 0..2 {
             let toy = grown(&mesh, 1.0, mode, seed);

@@ -70,7 +70,8 @@ struct Look {
 
 /// Metres of a world unit: drops are as fast and as large beside the organ as they would be.
 fn metres(organs: &Query<(&Perfusion, &GlobalTransform)>) -> f32 {
-    let unit = |(organ, place): (&Perfusion, &GlobalTransform)| organ.scale.metres() as f32 / place.scale().max_element();
+    let unit =
+        |(organ, place): (&Perfusion, &GlobalTransform)| organ.scale.metres() as f32 / place.scale().max_element();
     organs.iter().next().map_or(1.0, unit)
 }
 
@@ -122,7 +123,13 @@ fn bleed(
             let from = place.translation() + velocity * (CLEAR * 0.2 * scattered(dripping.drops, 7));
             let pose = Transform::from_translation(from).with_scale(Vec3::splat(radius));
             let drop = Drop { velocity, volume, age: 0.0 };
-            commands.spawn((drop, Mesh3d(look.mesh.clone()), MeshMaterial3d(look.material.clone()), pose, NotShadowCaster));
+            commands.spawn((
+                drop,
+                Mesh3d(look.mesh.clone()),
+                MeshMaterial3d(look.material.clone()),
+                pose,
+                NotShadowCaster,
+            ));
         }
         room -= count;
     }

@@ -92,10 +92,7 @@ fn breathe(
 }
 
 /// Colours organs by what their tissue gets.
-fn blanch(
-    organs: Query<(&Mesh3d, &Rest, &OrganSupply), Changed<OrganSupply>>,
-    mut meshes: ResMut<Assets<Mesh>>,
-) {
+fn blanch(organs: Query<(&Mesh3d, &Rest, &OrganSupply), Changed<OrganSupply>>, mut meshes: ResMut<Assets<Mesh>>) {
     for (mesh, rest, supply) in organs.iter().filter(|(_, rest, supply)| supply.vertices.len() == rest.colors.len()) {
         let Some(mut mesh) = meshes.get_mut(mesh.id()) else { continue };
         let tint = |(&[r, g, b, a], &supply): (&[f32; 4], &f32)| {

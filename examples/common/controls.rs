@@ -96,7 +96,7 @@ pub fn tell(
     let paused = if *control == GrowthControl::Paused { ", paused" } else { "" };
     let fps = diagnostics.get(&FrameTimeDiagnosticsPlugin::FPS).and_then(|fps| fps.smoothed()).unwrap_or_default();
     status.0 = format!(
-        "seed {} · step {} of {}{paused} · {nodes} nodes · {fps:.0} frames a second",
+        "seed {}, step {} of {}{paused}, {nodes} nodes, {fps:.1} frames a second",
         vasculature.seed, first.step, first.steps
     );
 }

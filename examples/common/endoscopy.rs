@@ -56,6 +56,6 @@ pub fn look_inside(
         lumen.travel(0.06 * direction * time.delta_secs());
         let (eye, ahead) = (lumen.point(lumen.at), lumen.point(lumen.at - Lumen::AHEAD * lumen.line.len() as f32));
         *transform = Transform::from_translation(eye).looking_at(ahead, transform.up());
-        status.0.push_str(" · inside");
+        status.0.push_str(", inside");
     }
 }

@@ -31,7 +31,8 @@ impl Plugin for InstrumentsPlugin {
     fn build(&self, app: &mut App) {
         let by_hand = (slash, operate).before(VesselSystems::Cut);
         let in_window = any_with_component::<PanOrbitCamera>;
-        app.add_systems(Update, by_hand.run_if(resource_exists::<Surface>).run_if(in_window)).add_systems(PostUpdate, show_clamps.before(TransformSystems::Propagate));
+        app.add_systems(Update, by_hand.run_if(resource_exists::<Surface>).run_if(in_window))
+            .add_systems(PostUpdate, show_clamps.before(TransformSystems::Propagate));
     }
 }
 
@@ -160,7 +161,8 @@ fn show_clamps(
 ) {
     let (mut meshes, Some(mut materials)) = assets else { return };
     let (bar, steel) = model.get_or_insert_with(|| {
-        let steel = StandardMaterial { metallic: 1.0, perceptual_roughness: 0.3, ..Color::srgb(0.8, 0.82, 0.85).into() };
+        let steel =
+            StandardMaterial { metallic: 1.0, perceptual_roughness: 0.3, ..Color::srgb(0.8, 0.82, 0.85).into() };
         (meshes.add(Cuboid::from_length(1.0)), materials.add(steel))
     });
     for (entity, vessels, wounds) in &changed {

@@ -124,7 +124,7 @@ fn operate(
     mut vessels: ResMut<CuttableVessels>,
     mut looks: Query<&mut VesselAppearance>,
     patient: (Query<(&CirculationState, &OrganSupply)>, Query<(&VesselSystem, &Vessels, &GlobalTransform)>),
-    surface: Option<Res<Surface>>,
+    (surface, dbg): (Option<Res<Surface>>, Query<(&GlobalTransform, &bevy_vessels::plugin::OpenEnd)>),
     mut exit: MessageWriter<AppExit>,
 ) -> Result {
     *step = TimeUpdateStrategy::ManualDuration(Duration::ZERO);
@@ -137,6 +137,7 @@ fn operate(
         // the blood flows and its supply is known: from here on, all is the same whatever the machine
         if patient.0.iter().any(|(state, supply)| state.flows() && !supply.vertices.is_empty()) {
             let arteries = patient.1.iter().filter(|(system, ..)| system.0 == System::Arterial);
+            eprintln!("site search");
             operation.site = arteries.filter_map(|(_, vessels, place)| Site::find(vessels, place, &surface)).next();
             more.expected = operation.site.is_some();
         }
@@ -164,6 +165,23 @@ fn operate(
         shots.0.push(Shot { file, view: site.view(), field_of_view: 36.0, endoscope: false });
     }
     operation.is_over = now >= END;
+    if std::env::var("DBG").is_ok() {
+        if before == 0.0 {
+            eprintln!(
+                "site {:?} {:?} {:?} {:?} scalpel {:?}",
+                site.wound,
+                site.normal,
+                site.across,
+                site.upstream,
+                site.scalpel(0.5, &surface)
+            );
+        }
+        if is_due(1.0) {
+            for end in &dbg {
+                eprintln!("end {:?} r {}", end.0.translation(), end.1.radius);
+            }
+        }
+    }
     if operation.is_over {
         more.expected = false;
     } else if more.taken >= shots.0.len() {
@@ -173,7 +191,12 @@ fn operate(
 }
 
 /// Keeps the figures, and writes them at the end.
-fn record(mut operation: ResMut<Operation>, figures: Figures, args: Res<StudioArgs>, mut written: Local<bool>) -> Result {
+fn record(
+    mut operation: ResMut<Operation>,
+    figures: Figures,
+    args: Res<StudioArgs>,
+    mut written: Local<bool>,
+) -> Result {
     let due = operation.table.len() as f64 * INTERVAL;
     if operation.site.is_some() && operation.time >= due - 1e-9 && !*written {
         let now = operation.time;

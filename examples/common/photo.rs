@@ -50,8 +50,7 @@ pub struct PhotoPlugin;
 
 impl Plugin for PhotoPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Shots>()
-            .init_resource::<Session>()
+        app.init_resource::<Session>()
             .init_resource::<MoreShots>()
             .add_systems(Update, (give_up, grow.run_if(not(grown)), photograph.run_if(grown)).chain());
     }

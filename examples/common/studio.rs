@@ -3,7 +3,7 @@
 use super::{
     headless::{HOW_TO_GET_PICTURES, OffscreenPlugin, OffscreenTarget, find_adapter, headless_plugins},
     light::{LightPlugin, camera_lights},
-    photo::{OVERSAMPLING, PhotoPlugin},
+    photo::{OVERSAMPLING, PhotoPlugin, Shots},
 };
 use bevy::{
     asset::UnapprovedPathMode,
@@ -74,7 +74,8 @@ impl Plugin for StudioPlugin {
         app.insert_resource(view)
             .insert_resource(self.args.clone())
             .insert_resource(Help(format!("{}\n{}", self.help, self.more_help)));
-        app.init_resource::<StatusLine>();
+        // Examples name their pictures also where a window is in the way of taking them.
+        app.init_resource::<StatusLine>().init_resource::<Shots>();
         if view != View::Nothing {
             app.add_plugins(LightPlugin).add_systems(Startup, spawn_camera);
         }
@@ -117,7 +118,8 @@ fn any_file() -> AssetPlugin {
     AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() }
 }
 
-fn has_display() -> bool {
+/// Whether a window can be opened.
+pub fn has_display() -> bool {
     !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 

@@ -11,6 +11,8 @@ use bevy::{
 pub const STEPS: DiagnosticPath = DiagnosticPath::const_new("vessels/steps");
 /// Milliseconds that these steps took.
 pub const STEP_TIME: DiagnosticPath = DiagnosticPath::const_new("vessels/step_time");
+/// Milliseconds of all that growth did in a frame: what the [`GrowthBudget`](crate::plugin::GrowthBudget) is for.
+pub const GROWTH_TIME: DiagnosticPath = DiagnosticPath::const_new("vessels/growth_time");
 /// Nodes of all vessels.
 pub const NODES: DiagnosticPath = DiagnosticPath::const_new("vessels/nodes");
 /// Drains of all organs that wait for a vessel.
@@ -20,6 +22,7 @@ pub const DRAINS: DiagnosticPath = DiagnosticPath::const_new("vessels/drains");
 pub(crate) fn register(app: &mut App) {
     app.register_diagnostic(Diagnostic::new(STEPS))
         .register_diagnostic(Diagnostic::new(STEP_TIME).with_suffix(" ms"))
+        .register_diagnostic(Diagnostic::new(GROWTH_TIME).with_suffix(" ms"))
         .register_diagnostic(Diagnostic::new(NODES).with_smoothing_factor(0.0))
         .register_diagnostic(Diagnostic::new(DRAINS).with_smoothing_factor(0.0));
 }
@@ -28,7 +31,8 @@ pub(crate) fn register(app: &mut App) {
 pub(crate) fn measure(mut diagnostics: Diagnostics, frame: Res<GrowthFrame>, organs: Query<&GrowthProgress>) {
     let total = |count: fn(&GrowthProgress) -> [usize; 2]| organs.iter().flat_map(count).sum::<usize>() as f64;
     diagnostics.add_measurement(&STEPS, || f64::from(frame.steps));
-    diagnostics.add_measurement(&STEP_TIME, || frame.time.as_secs_f64() * 1000.0);
+    diagnostics.add_measurement(&STEP_TIME, || frame.step_time.as_secs_f64() * 1000.0);
+    diagnostics.add_measurement(&GROWTH_TIME, || frame.time().as_secs_f64() * 1000.0);
     diagnostics.add_measurement(&NODES, || total(|progress| progress.nodes));
     diagnostics.add_measurement(&DRAINS, || total(|progress| progress.drains));
 }

@@ -2,6 +2,7 @@
 
 use crate::plugin::{
     components::{GrowthControl, Vasculature},
+    growth::{LastCosts, StepCost},
     messages::{GrowthAction, OrganError},
     organ_mesh::OrganMeshError,
     vessels::Lineage,
@@ -17,7 +18,7 @@ use bevy::{
     mesh::Mesh,
     tasks::{Task, futures::check_ready},
 };
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 /// A tissue, or why there is none.
 pub(crate) type Prepared = Result<Arc<dyn Tissue>, OrganError>;
@@ -60,6 +61,17 @@ pub struct GrowthState {
     changed: [Vec<u32>; 2],
     /// Whether the vessels are to be published anew, from the first node on.
     rebuild: bool,
+    costs: Costs,
+}
+
+/// What steps have cost.
+#[derive(Debug, Default)]
+struct Costs {
+    steps: LastCosts,
+    /// Publishing, for each step that was published.
+    publishing: LastCosts,
+    /// Steps that haven't been published.
+    unpublished: u32,
 }
 
 impl GrowthState {
@@ -159,9 +171,9 @@ impl GrowthState {
         self.need = Need::Nothing;
     }
 
-    /// Whether a tissue is being prepared.
-    pub(crate) fn awaits_tissue(&self) -> bool {
-        self.preparation.is_some()
+    /// Whether a tissue has been prepared and waits to be grown on.
+    pub(crate) fn is_tissue_ready(&self) -> bool {
+        self.preparation.as_ref().is_some_and(Task::is_finished)
     }
 
     /// The result of the preparation, once it is there.
@@ -187,6 +199,7 @@ impl GrowthState {
         self.error = None;
         self.rebuild = true;
         self.lineage = Lineage::new_one();
+        self.costs = Costs::default();
         let Some(tissue) = self.tissue.clone() else { return Ok(Vec::new()) };
         let mut settings = wish.settings.clone();
         if wish.fit {
@@ -234,6 +247,17 @@ impl GrowthState {
         }
     }
 
+    /// Takes note of what a step cost.
+    pub(crate) fn note_step(&mut self, cost: Duration) {
+        self.costs.steps.add(cost);
+        self.costs.unpublished += 1;
+    }
+
+    /// What the next step is expected to cost.
+    pub(crate) fn expected_cost(&self) -> StepCost {
+        StepCost { step: self.costs.steps.expected(), publish: self.costs.publishing.expected() }
+    }
+
     /// Does all remaining steps.
     pub(crate) fn run(&mut self) {
         // With so many steps, taking everything anew is cheaper than to remember every change.
@@ -265,8 +289,11 @@ impl GrowthState {
         self.tissue_lineage
     }
 
-    /// Forgets what has been published.
-    pub(crate) fn clear_news(&mut self) {
+    /// Forgets what has been published, at this cost.
+    pub(crate) fn clear_news(&mut self, cost: Duration) {
+        if let Some(each) = cost.checked_div(std::mem::take(&mut self.costs.unpublished)) {
+            self.costs.publishing.add(each);
+        }
         self.rebuild = false;
         self.changed.iter_mut().for_each(Vec::clear);
     }

@@ -139,6 +139,7 @@ impl Plugin for GrowthPlugin {
         app.add_systems(
             self.schedule,
             (
+                growth::begin_frame.before(VesselSystems::Source),
                 (
                     tissue_source::obey_commands,
                     tissue_source::notice_changes,

@@ -4,6 +4,7 @@
 
 use crate::plugin::{
     components::{GrowthProgress, OrganVessels, Vasculature, VesselAppearance, VesselSystem, VesselsOf},
+    growth::GrowthFrame,
     growth_state::GrowthState,
     segment_changes::SegmentChanges,
     vessel_index::VesselIndex,
@@ -13,7 +14,7 @@ use crate::synthesis::{colonization::Growth, tree::System};
 use bevy::{
     camera::{primitives::Aabb, visibility::Visibility},
     ecs::{
-        change_detection::DetectChangesMut,
+        change_detection::{DetectChangesMut, ResMut},
         entity::Entity,
         hierarchy::ChildOf,
         lifecycle::Remove,
@@ -23,6 +24,7 @@ use bevy::{
         system::{Commands, Query},
         world::EntityWorldMut,
     },
+    platform::time::Instant,
 };
 
 /// The vessels of one system of an organ, to be written.
@@ -41,8 +43,10 @@ pub(crate) fn publish_vessels(
     mut commands: Commands,
     mut organs: Query<(Entity, &mut GrowthState, &VesselAppearance, Option<&OrganVessels>)>,
     mut published: Query<PublishedVessels>,
+    mut frame: ResMut<GrowthFrame>,
 ) {
     for (organ, mut state, appearance, entities) in organs.iter_mut().filter(|(_, state, ..)| state.has_news()) {
+        let start = Instant::now();
         let entities = entities.map_or(&[][..], OrganVessels::entities);
         for system in System::ALL {
             let is_of_system = |&&entity: &&Entity| published.get(entity).is_ok_and(|found| found.system.0 == system);
@@ -60,7 +64,9 @@ pub(crate) fn publish_vessels(
                 }
             }
         }
-        state.clear_news();
+        let cost = start.elapsed();
+        state.clear_news(cost);
+        frame.publish_time += cost;
     }
 }
 

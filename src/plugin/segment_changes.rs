@@ -1,4 +1,4 @@
-//! Which segments of a vessel tree changed since someone last looked, in whole chunks.
+//! Which segments of a vessel tree changed since someone last looked.
 
 use bevy::ecs::component::Component;
 use std::ops::Range;
@@ -6,31 +6,31 @@ use std::ops::Range;
 /// Segments that changed since the last [`clear`](Self::clear), for those who keep a copy of them, such as a buffer on
 /// the graphics card.
 ///
-/// A segment has changed when either of its ends moved or changed its radius. Changes are kept per chunk of
-/// [`CHUNK`](Self::CHUNK) segments: a bit each, and uploads in few, long ranges.
+/// A segment has changed when either of its ends moved or changed its radius. While an organ grows, those are a tenth of
+/// all segments in a step, scattered over the whole tree along the paths from the new tips to the roots: so each segment
+/// has a bit of its own, and whole chunks would nearly all be marked.
 ///
 /// On a vessel entity, whoever draws the segments clears this after reading. There, a tree may also have become shorter:
 /// segments from [`VesselTree::len`](crate::synthesis::tree::VesselTree::len) on are gone.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
 pub struct SegmentChanges {
-    /// One bit per chunk.
-    chunks: Vec<u64>,
-    /// Whether every chunk counts as changed, however many there are.
+    /// One bit per node.
+    nodes: Vec<u64>,
+    /// Whether any bit is set.
+    any: bool,
+    /// Whether every segment counts as changed, however many there are.
     all: bool,
 }
 
 impl SegmentChanges {
-    /// Segments per chunk.
-    pub const CHUNK: usize = 256;
-
     /// Marks the segment that ends in a node.
     pub fn mark_node(&mut self, node: usize) {
-        let chunk = node / Self::CHUNK;
-        let word = chunk / 64;
-        if word >= self.chunks.len() {
-            self.chunks.resize(word + 1, 0);
+        let word = node / 64;
+        if word >= self.nodes.len() {
+            self.nodes.resize(word + 1, 0);
         }
-        self.chunks[word] |= 1 << (chunk % 64);
+        self.nodes[word] |= 1 << (node % 64);
+        self.any = true;
     }
 
     /// Marks every segment that there is, and those that will come until the next [`clear`](Self::clear).
@@ -40,28 +40,54 @@ impl SegmentChanges {
 
     /// Whether nothing changed.
     pub fn is_empty(&self) -> bool {
-        !self.all && self.chunks.iter().all(|&word| word == 0)
+        !self.all && !self.any
+    }
+
+    /// Whether every segment counts as changed.
+    pub fn is_all(&self) -> bool {
+        self.all
     }
 
     /// Forgets all changes and keeps the memory.
     pub fn clear(&mut self) {
-        self.chunks.fill(0);
-        self.all = false;
+        if self.any {
+            self.nodes.fill(0);
+        }
+        (self.any, self.all) = (false, false);
     }
 
-    /// Ranges of changed nodes of a tree of `len` nodes: runs of chunks, neighbours joined, in rising order.
+    /// Ranges of changed nodes of a tree of `len` nodes: neighbours joined, in rising order.
+    ///
+    /// The cost is that of a glance at 64 nodes at a time, and of the ranges.
     pub fn dirty_ranges(&self, len: usize) -> impl Iterator<Item = Range<usize>> + '_ {
-        let count = len.div_ceil(Self::CHUNK);
-        let mut chunk = 0;
+        let mut node = 0;
         std::iter::from_fn(move || {
-            let first = (chunk..count).find(|&chunk| self.has(chunk))?;
-            chunk = (first..count).find(|&chunk| !self.has(chunk)).unwrap_or(count);
-            Some(first * Self::CHUNK..(chunk * Self::CHUNK).min(len))
+            let first = self.next(node, len, true)?;
+            node = self.next(first, len, false).unwrap_or(len);
+            Some(first..node)
         })
     }
 
-    fn has(&self, chunk: usize) -> bool {
-        self.all || self.chunks.get(chunk / 64).is_some_and(|word| word >> (chunk % 64) & 1 == 1)
+    /// The first node from `from` on, below `len`, that has changed or has not.
+    fn next(&self, from: usize, len: usize, changed: bool) -> Option<usize> {
+        if self.all {
+            return (changed && from < len).then_some(from);
+        }
+        let mut word = from / 64;
+        let mut mask = u64::MAX << (from % 64);
+        while word * 64 < len {
+            let bits = self.nodes.get(word).copied().unwrap_or(0);
+            let wanted = mask & if changed { bits } else { !bits };
+            if wanted != 0 {
+                let node = word * 64 + wanted.trailing_zeros() as usize;
+                return (node < len).then_some(node);
+            }
+            if changed && word >= self.nodes.len() {
+                return None;
+            }
+            (word, mask) = (word + 1, u64::MAX);
+        }
+        None
     }
 }
 
@@ -69,22 +95,28 @@ impl SegmentChanges {
 mod tests {
     use super::*;
 
-    const CHUNK: usize = SegmentChanges::CHUNK;
-
     fn ranges(changes: &SegmentChanges, len: usize) -> Vec<Range<usize>> {
         changes.dirty_ranges(len).collect()
     }
 
     #[test]
-    fn neighbouring_chunks_join_and_the_last_is_cut_to_length() {
+    fn neighbours_join_over_words_and_the_last_is_cut_to_length() {
         let mut changes = SegmentChanges::default();
-        for node in [3, CHUNK, 5 * CHUNK - 1, 70 * CHUNK + 1] {
+        for node in [3, 62, 63, 64, 65, 128, 300] {
             changes.mark_node(node);
         }
-        let len = 70 * CHUNK + 9;
-        assert_eq!(ranges(&changes, len), [0..2 * CHUNK, 4 * CHUNK..5 * CHUNK, 70 * CHUNK..len]);
-        assert_eq!(ranges(&changes, 10), [0..10]);
+        assert_eq!(ranges(&changes, 301), [3..4, 62..66, 128..129, 300..301]);
+        assert_eq!(ranges(&changes, 64), [3..4, 62..64]);
+        assert_eq!(ranges(&changes, 100_000), ranges(&changes, 301));
         assert!(ranges(&changes, 0).is_empty());
+    }
+
+    #[test]
+    fn whole_words_make_one_range() {
+        let mut changes = SegmentChanges::default();
+        (64..64 * 9).for_each(|node| changes.mark_node(node));
+        assert_eq!(ranges(&changes, 10_000), [64..64 * 9]);
+        assert_eq!(ranges(&changes, 200), [64..200]);
     }
 
     #[test]
@@ -93,21 +125,24 @@ mod tests {
         assert!(changes.is_empty());
         changes.mark_all();
         assert_eq!(ranges(&changes, 1000), [0..1000]);
-        assert!(!changes.is_empty());
+        assert!(!changes.is_empty() && changes.is_all());
         changes.clear();
         assert!(changes.is_empty());
         assert!(ranges(&changes, 1000).is_empty());
     }
 
     #[test]
-    fn every_marked_node_is_in_a_range_and_no_other_chunk_is() {
+    fn ranges_hold_the_marked_nodes_and_no_other() {
         let mut changes = SegmentChanges::default();
-        let marked: Vec<usize> = (0..40).map(|i| i * i * 37 % 20_000).collect();
+        let marked: Vec<usize> = (0..400).map(|i| i * i * 37 % 20_000).collect();
         marked.iter().for_each(|&node| changes.mark_node(node));
-        let covered = ranges(&changes, 20_000);
-        for node in 0..20_000 {
-            let expected = marked.iter().any(|&other| other / CHUNK == node / CHUNK);
-            assert_eq!(covered.iter().any(|range| range.contains(&node)), expected, "node {node}");
-        }
+        let found = ranges(&changes, 20_000);
+        assert!(found.windows(2).all(|pair| pair[0].end < pair[1].start), "neighbours are joined, in rising order");
+        let mut expected = marked.clone();
+        expected.sort_unstable();
+        expected.dedup();
+        assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
+        changes.clear();
+        assert!(ranges(&changes, 20_000).is_empty());
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! Each frame: commands are obeyed, then wishes and meshes are compared with what the growth follows, then what the
 //! difference needs is done. A new tissue is prepared in the task pool, a growth on the same tissue starts at once and
-//! uses its buffers again.
+//! uses its buffers again. Where many growths start at once, the budget spreads them over frames.
 
 use crate::plugin::{
     components::{GrowthControl, GrowthPhase, GrowthProgress, Vasculature},
     deformation::RestMesh,
+    growth::{GrowthBudget, GrowthFrame, LastCosts, begin_after},
     growth_state::{GrowthState, Need, Prepared},
     messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganError},
     organ_mesh::{MeshCopy, OrganMeshError, copy_mesh},
@@ -20,14 +21,15 @@ use crate::synthesis::{
 use bevy::{
     asset::{AssetEvent, AssetId, AssetServer, Assets, LoadState},
     ecs::{
-        change_detection::{DetectChanges, DetectChangesMut, Ref, Res},
+        change_detection::{DetectChanges, DetectChangesMut, Ref, Res, ResMut},
         entity::Entity,
         message::{MessageReader, MessageWriter},
         query::QueryData,
-        system::{Query, SystemParam},
+        system::{Local, Query, SystemParam},
     },
     log::warn,
     mesh::{Mesh, Mesh3d},
+    platform::time::Instant,
     tasks::{AsyncComputeTaskPool, TaskPool},
 };
 use std::{sync::Arc, time::Duration};
@@ -92,23 +94,62 @@ pub(crate) fn notice_changes(
 }
 
 /// Begins what is needed: a tissue's preparation in the task pool, or a growth on the tissue at hand.
-pub(crate) fn begin(meshes: OrganMeshes, mut organs: Query<Organ>, mut messages: StartMessages) {
-    for mut organ in organs.iter_mut().filter(|organ| organ.state.need != Need::Nothing) {
+pub(crate) fn begin(
+    meshes: OrganMeshes,
+    mut organs: Query<Organ>,
+    mut messages: StartMessages,
+    mut account: StartAccount,
+) {
+    let waiting = organs.iter().filter(|organ| organ.state.need != Need::Nothing).map(|organ| organ.entity);
+    account.start_in_turn(waiting.collect(), |organ| {
+        let Ok(mut organ) = organs.get_mut(organ) else { return };
         let outcome = organ.begin(&meshes, |state, prepare| {
             let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
             state.await_tissue(pool.spawn(async move { prepare() }));
             None
         });
         organ.report(outcome, &mut messages);
-    }
+    });
 }
 
 /// Starts the growth of organs whose tissue has become ready.
-pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessages) {
-    for mut organ in organs.iter_mut().filter(|organ| organ.state.awaits_tissue()) {
+pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessages, mut account: StartAccount) {
+    let ready = organs.iter().filter(|organ| organ.state.is_tissue_ready()).map(|organ| organ.entity);
+    account.start_in_turn(ready.collect(), |organ| {
+        let Ok(mut organ) = organs.get_mut(organ) else { return };
         if let Some(prepared) = organ.state.poll_preparation() {
             let outcome = organ.start(Some(prepared));
             organ.report(outcome, &mut messages);
+        }
+    });
+}
+
+/// What starts cost, and who had a turn last.
+#[derive(SystemParam)]
+pub(crate) struct StartAccount<'w, 's> {
+    budget: Res<'w, GrowthBudget>,
+    frame: ResMut<'w, GrowthFrame>,
+    costs: Local<'s, LastCosts>,
+    last: Local<'s, Option<Entity>>,
+}
+
+impl StartAccount<'_, '_> {
+    /// Starts organs in turn as long as the budget allows; one at least.
+    fn start_in_turn(&mut self, organs: Vec<Entity>, mut start: impl FnMut(Entity)) {
+        let mut round: Vec<_> = organs.into_iter().map(|organ| (organ, ())).collect();
+        round.sort_unstable();
+        begin_after(&mut round, *self.last);
+        for (starts, (organ, ())) in (0..).zip(round) {
+            let expected = self.frame.start_time + self.costs.expected();
+            if !self.budget.allows_start(starts, || expected) {
+                break;
+            }
+            let clock = Instant::now();
+            start(organ);
+            let cost = clock.elapsed();
+            self.costs.add(cost);
+            self.frame.start_time += cost;
+            *self.last = Some(organ);
         }
     }
 }

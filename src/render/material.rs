@@ -1,5 +1,6 @@
 //! What segments are made of: Bevy's standard material, with a vertex stage that pulls segments from a buffer.
 
+use super::template::ATTRIBUTE_DETAIL;
 use crate::synthesis::tree::System;
 use bevy::{
     asset::embedded_path,
@@ -57,6 +58,8 @@ impl MaterialExtension for SegmentExtension {
         descriptor.vertex.buffers = vec![layout.0.get_layout(&[
             Mesh::ATTRIBUTE_POSITION.at_shader_location(0),
             Mesh::ATTRIBUTE_UV_0.at_shader_location(1),
+            Mesh::ATTRIBUTE_NORMAL.at_shader_location(2),
+            ATTRIBUTE_DETAIL.at_shader_location(3),
         ])?];
         // the colour comes out of our vertex stage although the mesh has no such attribute
         descriptor.vertex.shader_defs.push("VERTEX_COLORS".into());

@@ -3,22 +3,28 @@
 //! In: [`Vessels`](crate::plugin::Vessels) and the chunks of them that [`SegmentChanges`](crate::plugin::SegmentChanges)
 //! marks. Out: a picture, with shadows, prepasses and multisampling.
 //!
-//! A vessel entity, however large, is a handful of chunk entities that share one mesh: many copies of a template cone
+//! A vessel entity, however large, is a handful of chunk entities that share a few meshes: many copies of a template cone
 //! with round ends. The vertex stage looks up each copy's end points and radii in a storage buffer and shapes it there.
 //! Growth rewrites only the slots that changed; with nothing changed, nothing happens. Severed segments show what is left of
 //! them, see `stumps`, with a view into the lumen. Chunks are children of the vessel
 //! entity, which is a child of the organ: transforms, visibility and despawning follow the hierarchy. Each chunk has its own
-//! bounding box, so parts outside the view are not drawn.
+//! bounding box, so parts outside the view are not drawn; and each has the level of detail that its size in the picture asks
+//! for.
+//!
+//! A chunk has up to 4096 segments, which makes an idle frame of a million segments cheap for the CPU: what Bevy does for
+//! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often: vessels
+//! grow everywhere at once, so 256 segments that follow one another reach over three quarters of an organ already.
 //!
 //! Without a GPU, or with one that lacks storage buffers (WebGL 2), nothing is drawn and growth goes on: one warning says so.
 
 use crate::synthesis::instances::SegmentInstance;
 use bevy::{
     asset::{AssetEventSystems, embedded_asset},
+    camera::{CameraUpdateSystems, visibility::VisibilitySystems},
     pbr::PbrPlugin,
     prelude::*,
     render::{
-        ExtractSchedule, Render, RenderApp, RenderSystems,
+        ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems,
         erased_render_asset::prepare_erased_assets,
         render_asset::prepare_assets,
         render_resource::{DownlevelFlags, WgpuLimits},
@@ -27,6 +33,7 @@ use bevy::{
     },
 };
 
+mod detail;
 mod material;
 mod segments;
 mod stumps;
@@ -35,9 +42,9 @@ mod upload;
 
 pub use material::{SegmentExtension, SegmentMaterial, VesselMaterials};
 pub use segments::{SegmentBuffer, SegmentChunk};
-pub use template::{SEGMENTS_PER_CHUNK, chunk_mesh};
 
-use upload::{SegmentWrites, extract_writes, write_segments_to_gpu};
+use detail::{ChunkMeshes, Detail, FEWEST_SLOTS, Shape, choose_detail};
+use upload::{SegmentWrites, extract_writes, queue_scatter_pipeline, write_segments_to_gpu};
 
 /// Draws the segments of all vessel entities.
 ///
@@ -56,6 +63,21 @@ pub struct SegmentRenderPlugin {
     ///
     /// Limits: 0 to 16, clamped. Default: [`Self::DEFAULT_CAP_RINGS`].
     pub cap_rings: u32,
+    /// How far the outline of a segment may be from that of its true shape before it gets fewer corners.
+    ///
+    /// Higher values draw distant vessels faster, and more angular. 0 keeps all corners at any distance.
+    ///
+    /// Units: pixels. Limits: 0 to 2, clamped. Default: [`Self::DEFAULT_TOLERANCE`].
+    pub tolerance: f32,
+    /// Width below which segments drop out. The fewer are left, the wider they are drawn, so that vessels keep the part of
+    /// the picture that they cover, don't sparkle, and an organ far away costs little.
+    ///
+    /// Higher values are faster, and turn thin vessels into dots sooner. Half a pixel suits 4× multisampling, which shows
+    /// what is so thin as a continuous line; without multisampling, 1 keeps distant vessels from sparkling. At 0 every
+    /// segment is drawn, however small, and is seen or not as chance will have it.
+    ///
+    /// Units: pixels. Limits: 0 to 2, clamped. Default: [`Self::DEFAULT_LEAST_WIDTH`].
+    pub least_width: f32,
 }
 
 impl SegmentRenderPlugin {
@@ -63,11 +85,27 @@ impl SegmentRenderPlugin {
     pub const DEFAULT_SIDES: u32 = 8;
     /// Default of [`cap_rings`](Self::cap_rings).
     pub const DEFAULT_CAP_RINGS: u32 = 1;
+    /// Default of [`tolerance`](Self::tolerance).
+    pub const DEFAULT_TOLERANCE: f32 = 0.25;
+    /// Default of [`least_width`](Self::least_width).
+    pub const DEFAULT_LEAST_WIDTH: f32 = 0.5;
+
+    /// The settings, within their limits.
+    fn detail(&self) -> Detail {
+        let shape = Shape { sides: self.sides.clamp(3, 64), cap_rings: self.cap_rings.min(16) };
+        let pixels = |value: f32| if value.is_nan() { 0.0 } else { value.clamp(0.0, 2.0) };
+        Detail { shape, tolerance: pixels(self.tolerance), least_width: pixels(self.least_width) }
+    }
 }
 
 impl Default for SegmentRenderPlugin {
     fn default() -> Self {
-        Self { sides: Self::DEFAULT_SIDES, cap_rings: Self::DEFAULT_CAP_RINGS }
+        Self {
+            sides: Self::DEFAULT_SIDES,
+            cap_rings: Self::DEFAULT_CAP_RINGS,
+            tolerance: Self::DEFAULT_TOLERANCE,
+            least_width: Self::DEFAULT_LEAST_WIDTH,
+        }
     }
 }
 
@@ -77,10 +115,9 @@ impl Plugin for SegmentRenderPlugin {
             return;
         }
         embedded_asset!(app, "segments.wgsl");
-        app.add_plugins(MaterialPlugin::<SegmentMaterial>::default());
-        let mesh = chunk_mesh(self.sides.clamp(3, 64), self.cap_rings.min(16));
-        let template = SegmentTemplate(app.world_mut().resource_mut::<Assets<Mesh>>().add(mesh));
-        app.insert_resource(template)
+        embedded_asset!(app, "scatter.wgsl");
+        app.add_plugins(MaterialPlugin::<SegmentMaterial>::default())
+            .insert_resource(ChunkMeshes::new(&self.detail()))
             .init_resource::<VesselMaterials>()
             .init_resource::<SegmentWrites>()
             .add_observer(segments::detach_buffer)
@@ -93,69 +130,88 @@ impl Plugin for SegmentRenderPlugin {
             )
             .add_systems(
                 PostUpdate,
-                (segments::attach_buffers, segments::update_segments).chain().in_set(SegmentSystems),
+                (
+                    (segments::attach_buffers, segments::update_segments).chain().in_set(SegmentSystems),
+                    choose_detail
+                        .after(TransformSystems::Propagate)
+                        .after(CameraUpdateSystems)
+                        .before(AssetEventSystems)
+                        .before(VisibilitySystems::CheckVisibility)
+                        .run_if(resource_exists::<SegmentLimits>),
+                ),
             );
         build_render_app(app);
     }
 
     fn finish(&self, app: &mut App) {
-        let draws = app.world().contains_resource::<SegmentTemplate>();
-        match (app.world().get_resource::<RenderDevice>(), app.world().get_resource::<RenderAdapter>()) {
-            (Some(device), Some(adapter)) if draws => {
+        let slots = app.world().get_resource::<ChunkMeshes>().map(ChunkMeshes::slots);
+        match (app.world().get_resource::<RenderDevice>(), app.world().get_resource::<RenderAdapter>(), slots) {
+            (Some(device), Some(adapter), Some(slots)) => {
                 let flags = adapter.get_downlevel_capabilities().flags;
-                match SegmentLimits::new(&device.limits(), flags) {
+                match SegmentLimits::new(&device.limits(), flags, slots) {
                     Some(limits) => drop(app.insert_resource(limits)),
-                    None => warn!("vessels are not drawn: this graphics backend has no storage buffers for vertices"),
+                    None => warn!(
+                        "vessels are not drawn: this graphics backend has no storage buffers for vertices, or no compute \
+                         shaders"
+                    ),
                 }
             }
-            (Some(_), _) => warn!("vessels are not drawn: add the vessel plugin after DefaultPlugins, with PbrPlugin"),
-            (None, _) => {}
+            (Some(_), ..) => warn!("vessels are not drawn: add the vessel plugin after DefaultPlugins, with PbrPlugin"),
+            (None, ..) => {}
         }
     }
 }
 
 fn build_render_app(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
-    render_app.init_resource::<SegmentWrites>().add_systems(ExtractSchedule, extract_writes).add_systems(
-        Render,
-        // Bevy doesn't order materials after the buffers that they bind: one that grew must be there first, or its
-        // material would go on drawing from the old one
-        write_segments_to_gpu
-            .in_set(RenderSystems::PrepareAssets)
-            .after(prepare_assets::<GpuShaderBuffer>)
-            .before(prepare_erased_assets::<MeshMaterial3d<SegmentMaterial>>),
-    );
+    render_app
+        .init_resource::<SegmentWrites>()
+        .add_systems(RenderStartup, queue_scatter_pipeline)
+        .add_systems(ExtractSchedule, extract_writes)
+        .add_systems(
+            Render,
+            // Bevy doesn't order materials after the buffers that they bind: one that grew must be there first, or its
+            // material would go on drawing from the old one
+            write_segments_to_gpu
+                .in_set(RenderSystems::PrepareAssets)
+                .after(prepare_assets::<GpuShaderBuffer>)
+                .before(prepare_erased_assets::<MeshMaterial3d<SegmentMaterial>>),
+        );
 }
 
 /// The systems that bring drawn segments up to date, in `PostUpdate`, before transforms are propagated.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SegmentSystems;
 
-/// The chunk mesh that all vessel entities share.
-#[derive(Resource, Debug)]
-struct SegmentTemplate(Handle<Mesh>);
-
 /// What the GPU can take. Present only where segments are drawn.
 #[derive(Resource, Clone, Copy, Debug)]
 pub struct SegmentLimits {
     max_segments: usize,
+    segments_per_chunk: usize,
 }
 
 impl SegmentLimits {
-    /// `None` when the vertex stage can't read storage buffers.
-    fn new(limits: &WgpuLimits, flags: DownlevelFlags) -> Option<Self> {
-        if !flags.contains(DownlevelFlags::VERTEX_STORAGE) || limits.max_storage_buffers_per_shader_stage == 0 {
+    /// `None` when the vertex stage can't read storage buffers, or compute shaders can't write them.
+    fn new(limits: &WgpuLimits, flags: DownlevelFlags, segments_per_chunk: usize) -> Option<Self> {
+        let needed = DownlevelFlags::VERTEX_STORAGE | DownlevelFlags::COMPUTE_SHADERS;
+        if !flags.contains(needed) || limits.max_storage_buffers_per_shader_stage == 0 {
             return None;
         }
         let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         // mesh tags and node indices are 32-bit
         let segments = (bytes / SegmentInstance::SIZE as u64).min(1 << 31) as usize;
-        Some(Self { max_segments: segments - segments % SEGMENTS_PER_CHUNK })
+        let max_segments = segments - segments % segments_per_chunk;
+        (max_segments >= FEWEST_SLOTS).then_some(Self { max_segments, segments_per_chunk })
     }
 
     /// Segments of one vessel entity that can be drawn: those that fit in a storage buffer.
     pub fn max_segments(&self) -> usize {
         self.max_segments
+    }
+
+    /// Segments that one chunk entity draws at most: fewer where their template is very round.
+    pub fn segments_per_chunk(&self) -> usize {
+        self.segments_per_chunk
     }
 }
 
@@ -163,20 +219,30 @@ impl SegmentLimits {
 mod tests {
     use super::*;
 
+    const CHUNK: usize = 4096;
+
     #[test]
     fn limits_are_whole_chunks_that_fit_in_a_buffer() {
         let device = WgpuLimits { max_storage_buffer_binding_size: 1 << 20, max_buffer_size: 1 << 30, ..default() };
-        let limits = SegmentLimits::new(&device, DownlevelFlags::all()).unwrap();
-        assert_eq!(limits.max_segments() % SEGMENTS_PER_CHUNK, 0);
+        let limits = SegmentLimits::new(&device, DownlevelFlags::all(), CHUNK).unwrap();
+        assert_eq!(limits.max_segments() % CHUNK, 0);
         let bytes = limits.max_segments() * SegmentInstance::SIZE;
-        assert!(bytes <= 1 << 20 && bytes > (1 << 20) - SEGMENTS_PER_CHUNK * SegmentInstance::SIZE);
+        assert!(bytes <= 1 << 20 && bytes > (1 << 20) - CHUNK * SegmentInstance::SIZE);
     }
 
     #[test]
-    fn devices_without_storage_buffers_draw_nothing() {
-        let without_vertex_storage = DownlevelFlags::all() - DownlevelFlags::VERTEX_STORAGE;
-        assert!(SegmentLimits::new(&WgpuLimits::default(), without_vertex_storage).is_none());
+    fn devices_that_lack_something_draw_nothing() {
+        for lacking in [DownlevelFlags::VERTEX_STORAGE, DownlevelFlags::COMPUTE_SHADERS] {
+            assert!(SegmentLimits::new(&WgpuLimits::default(), DownlevelFlags::all() - lacking, CHUNK).is_none());
+        }
         let none = WgpuLimits::downlevel_webgl2_defaults();
-        assert!(SegmentLimits::new(&none, DownlevelFlags::all()).is_none());
+        assert!(SegmentLimits::new(&none, DownlevelFlags::all(), CHUNK).is_none());
+    }
+
+    #[test]
+    fn settings_outside_their_limits_are_clamped() {
+        let wild = SegmentRenderPlugin { sides: 0, cap_rings: 99, tolerance: f32::NAN, least_width: 1e9 };
+        let Detail { shape, tolerance, least_width } = wild.detail();
+        assert_eq!((shape.sides, shape.cap_rings, tolerance, least_width), (3, 16, 0.0, 2.0));
     }
 }

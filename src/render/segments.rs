@@ -1,15 +1,16 @@
 //! Keeps the chunks of every vessel entity, their boxes and their buffer up to date with its tree.
 
 use super::{
-    SegmentLimits, SegmentTemplate,
+    SegmentLimits,
+    detail::{ChunkMeshes, FEWEST_SLOTS},
     material::{SegmentExtension, SegmentMaterial, VesselMaterials},
     stumps::Stumps,
-    template::SEGMENTS_PER_CHUNK,
     upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
     plugin::{
-        SegmentChanges, SegmentColoring, SegmentSupply, VesselAppearance, VesselSystem, VesselWounds, Vessels, VesselsOf,
+        SegmentChanges, SegmentColoring, SegmentSupply, VesselAppearance, VesselSystem, VesselWounds, Vessels,
+        VesselsOf,
     },
     synthesis::{
         instances::{SegmentColors, SegmentInstance, write_segments},
@@ -20,7 +21,7 @@ use bevy::{
     asset::RenderAssetUsages,
     camera::{primitives::Aabb, visibility::NoAutoAabb},
     ecs::{query::QueryData, system::SystemParam},
-    math::bounding::Aabb3d,
+    math::bounding::{Aabb3d, BoundingVolume},
     mesh::MeshTag,
     prelude::*,
     render::storage::ShaderBuffer,
@@ -36,8 +37,12 @@ pub struct SegmentBuffer {
     material: Handle<SegmentMaterial>,
     /// Segments that the buffer has room for.
     capacity: usize,
+    /// Slots that may hold something else than hidden segments.
+    written: usize,
     /// Chunk entities, in the order of their slots.
     chunks: Vec<Entity>,
+    /// What is in each chunk.
+    contents: Vec<ChunkContents>,
     colors: SegmentColors,
     /// The appearance that `colors` follow, `None` at first.
     look: Option<Look>,
@@ -45,7 +50,7 @@ pub struct SegmentBuffer {
     /// What severed segments show.
     pub(super) stumps: Stumps,
     /// Slots that the buffer has for stumps, behind those of the nodes.
-    pub(super) room: usize,
+    room: usize,
 }
 
 impl SegmentBuffer {
@@ -56,8 +61,8 @@ impl SegmentBuffer {
 
     /// The buffer that holds this vessel entity's segments, one
     /// [`SegmentInstance`](crate::synthesis::instances::SegmentInstance) per node, for materials and compute shaders of
-    /// your own. From [`capacity`](Self::capacity) on follow what pieces of severed segments there are beside the first of
-    /// each, in no order. It is on the GPU only, and moves when it grows: ask again after the handle's asset was modified.
+    /// your own. From [`capacity`](Self::capacity) on follow the pieces of severed segments beside the first of each, in no
+    /// order. It is on the GPU only, and moves when it grows: ask again after the handle's asset was modified.
     pub fn buffer(&self) -> &Handle<ShaderBuffer> {
         &self.buffer
     }
@@ -78,9 +83,42 @@ impl SegmentBuffer {
     }
 }
 
-/// Marks an entity that draws one chunk of segments.
+/// An entity that draws one chunk of segments. For reading: its mesh follows its size in the picture.
 #[derive(Component, Debug)]
-pub struct SegmentChunk;
+pub struct SegmentChunk {
+    /// Radius of the thickest segment, in the local space of the vessel entity.
+    pub(super) thickest: f32,
+    /// Slots that its mesh must have.
+    pub(super) slots: usize,
+    /// Its level of detail.
+    pub(super) level: usize,
+    /// Level and slots of the mesh that it has.
+    pub(super) drawn: (usize, usize),
+}
+
+impl SegmentChunk {
+    /// Level of detail, 0 for the finest. Each further one has fewer corners, or fewer segments.
+    pub fn level(&self) -> usize {
+        self.level
+    }
+}
+
+/// What a chunk's box and thickness follow from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct ChunkContents {
+    bounds: Option<Aabb3d>,
+    thickest: f32,
+}
+
+impl ChunkContents {
+    /// Takes in segments within a box. While vessels grow, what they were before lies within what they are now.
+    pub(super) fn add(&mut self, bounds: Option<Aabb3d>, segments: &[SegmentInstance]) {
+        let Some(new) = bounds else { return };
+        self.bounds = Some(self.bounds.map_or(new, |old| old.merge(&new)));
+        let radii = segments.iter().flat_map(SegmentInstance::radii);
+        self.thickest = radii.fold(self.thickest, f32::max);
+    }
+}
 
 /// What decides the colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,7 +159,7 @@ pub(super) fn attach_buffers(
     mut materials: ResMut<Assets<SegmentMaterial>>,
 ) {
     for (entity, system) in &new {
-        let (capacity, stumps) = (SEGMENTS_PER_CHUNK, Stumps::default());
+        let (capacity, stumps) = (FEWEST_SLOTS, Stumps::default());
         let bytes = (capacity + stumps.room()) * SegmentInstance::SIZE;
         let mut buffer = ShaderBuffer::with_size(bytes, RenderAssetUsages::default());
         buffer.buffer_description.label = Some("vessel segments");
@@ -132,7 +170,9 @@ pub(super) fn attach_buffers(
             buffer,
             material,
             capacity,
+            written: 0,
             chunks: Vec::new(),
+            contents: Vec::new(),
             colors: SegmentColors::Uniform([1.0; 3]),
             look: None,
             warned_of_limit: false,
@@ -156,11 +196,12 @@ pub(super) fn detach_buffer(removed: On<Remove, Vessels>, mut commands: Commands
 #[derive(SystemParam)]
 pub(super) struct SegmentStore<'w, 's> {
     pub(super) commands: Commands<'w, 's>,
-    boxes: Query<'w, 's, &'static mut Aabb, With<SegmentChunk>>,
+    drawn: Query<'w, 's, (&'static mut Aabb, &'static mut SegmentChunk)>,
     buffers: ResMut<'w, Assets<ShaderBuffer>>,
     materials: ResMut<'w, Assets<SegmentMaterial>>,
+    meshes: ResMut<'w, Assets<Mesh>>,
     pub(super) writes: ResMut<'w, SegmentWrites>,
-    template: Res<'w, SegmentTemplate>,
+    templates: ResMut<'w, ChunkMeshes>,
     limits: Res<'w, SegmentLimits>,
 }
 
@@ -196,14 +237,18 @@ pub(super) fn update_segments(
             None => Look::new(&VesselAppearance::default(), drawn.system.0),
         };
         let (vessels, segments) = (drawn.vessels, &mut *drawn.segments);
+        let nodes = vessels.tree().len();
         let supply = drawn.supply.as_ref().map_or(&[][..], |supply| &supply.segments[..]);
-        let dirty = segments.dirty_chunks(vessels, &drawn.changes, look, supply);
-        segments.cut(vessels, drawn.wounds, &dirty);
-        let len = store.drawable(drawn.entity, vessels.tree().len(), segments);
+        let changes = drawn.changes.bypass_change_detection();
+        segments.adopt(look, vessels, supply, changes);
+        let wounds = drawn.wounds.map(|wounds| &**wounds);
+        segments.stumps.update(wounds, vessels, &segments.colors, changes.dirty_ranges(nodes), nodes);
+        let len = store.drawable(drawn.entity, nodes, segments);
         store.resize(segments, len);
-        store.write(drawn.entity, vessels, segments, &dirty, len);
+        store.write(vessels, changes, segments, len);
+        store.fit_chunks(drawn.entity, segments, len);
         store.write_stumps(drawn.entity, segments);
-        drawn.changes.bypass_change_detection().clear();
+        changes.clear();
     }
 }
 
@@ -213,38 +258,22 @@ impl SegmentBuffer {
         matches!(self.look, Some(Look::Supply(_)))
     }
 
-    /// Adopts look and supply and returns the chunks to be written, rising.
-    fn dirty_chunks(&mut self, vessels: &Vessels, changes: &SegmentChanges, look: Look, supply: &[f32]) -> Vec<usize> {
+    /// Adopts look and supply, and marks the segments that have another colour now.
+    fn adopt(&mut self, look: Look, vessels: &Vessels, supply: &[f32], changes: &mut SegmentChanges) {
         let (tree, births) = (vessels.tree(), vessels.birth_steps());
-        let len = tree.len();
         if self.look != Some(look) {
             self.look = Some(look);
             self.colors = look.colors();
-            self.colors.refresh(tree, births, [0..len]);
+            self.colors.refresh(tree, births, [0..tree.len()]);
             self.colors.set_supply(supply);
-            return (0..len.div_ceil(SEGMENTS_PER_CHUNK)).collect();
+            changes.mark_all();
+            return;
         }
-        let recolored = self.colors.refresh(tree, births, changes.dirty_ranges(len));
-        let blanched = self.colors.set_supply(supply);
-        let ranges = changes.dirty_ranges(len).chain(recolored).chain(blanched);
-        let mut chunks: Vec<usize> = ranges.flat_map(|range| chunks_of(range, len)).collect();
-        chunks.sort_unstable();
-        chunks.dedup();
-        chunks
+        let recolored = self.colors.refresh(tree, births, changes.dirty_ranges(tree.len()));
+        for recolored in recolored.into_iter().chain(self.colors.set_supply(supply)) {
+            recolored.for_each(|node| changes.mark_node(node));
+        }
     }
-
-    /// Takes in what wounds left of the segments in some chunks.
-    fn cut(&mut self, vessels: &Vessels, wounds: Option<&VesselWounds>, chunks: &[usize]) {
-        let len = vessels.tree().len();
-        let nodes = chunks.iter().map(|chunk| chunk * SEGMENTS_PER_CHUNK..((chunk + 1) * SEGMENTS_PER_CHUNK).min(len));
-        self.stumps.update(wounds.map(|wounds| &**wounds), vessels, &self.colors, nodes, len);
-    }
-}
-
-/// The chunks that nodes of a range are in.
-fn chunks_of(range: Range<usize>, len: usize) -> Range<usize> {
-    let end = range.end.min(len);
-    if range.start >= end { 0..0 } else { range.start / SEGMENTS_PER_CHUNK..end.div_ceil(SEGMENTS_PER_CHUNK) }
 }
 
 impl SegmentStore<'_, '_> {
@@ -264,7 +293,8 @@ impl SegmentStore<'_, '_> {
 
     /// Makes room for `len` segments and for the stumps, and drops the chunks beyond them.
     fn resize(&mut self, segments: &mut SegmentBuffer, len: usize) {
-        let (most, room) = (self.limits.max_segments(), segments.stumps.room().min(self.limits.max_segments()));
+        let most = self.limits.max_segments();
+        let room = segments.stumps.room().min(most);
         if len > segments.capacity || room > segments.room {
             let wanted = if len > segments.capacity { len.next_power_of_two() } else { segments.capacity };
             (segments.capacity, segments.room) = (wanted.min(most - room), room);
@@ -277,48 +307,92 @@ impl SegmentStore<'_, '_> {
             }
         }
         self.move_stumps(segments);
-        let needed = len.div_ceil(SEGMENTS_PER_CHUNK);
+        let needed = len.div_ceil(self.templates.slots());
+        segments.contents.resize(needed, ChunkContents::default());
         for chunk in segments.chunks.drain(needed.min(segments.chunks.len())..) {
             self.commands.entity(chunk).try_despawn();
         }
     }
 
-    /// Queues the chunks' segments, neighbours as one write, and fits their boxes.
-    fn write(&mut self, entity: Entity, vessels: &Vessels, segments: &mut SegmentBuffer, dirty: &[usize], len: usize) {
-        let drawn = dirty.partition_point(|&chunk| chunk * SEGMENTS_PER_CHUNK < len);
-        for run in dirty[..drawn].chunk_by(|a, b| a + 1 == *b) {
-            let mut written = vec![SegmentInstance::HIDDEN; run.len() * SEGMENTS_PER_CHUNK];
-            for (&chunk, out) in run.iter().zip(written.chunks_exact_mut(SEGMENTS_PER_CHUNK)) {
-                let nodes = chunk * SEGMENTS_PER_CHUNK..((chunk + 1) * SEGMENTS_PER_CHUNK).min(len);
+    /// Queues the segments that changed, and takes them into their chunks.
+    fn write(&mut self, vessels: &Vessels, changes: &SegmentChanges, segments: &mut SegmentBuffer, len: usize) {
+        let slots = self.templates.slots();
+        if changes.is_all() {
+            segments.contents.fill(ChunkContents::default());
+        }
+        let mut write = SegmentWrite::new(segments.buffer.clone());
+        for range in changes.dirty_ranges(len) {
+            for nodes in split(range, slots) {
+                let (chunk, first) = (nodes.start / slots, write.len());
+                let out = write.extend(nodes.clone());
                 let (tree, births) = (vessels.tree(), vessels.birth_steps());
                 let bounds = write_segments(tree, births, nodes.clone(), &segments.colors, out);
                 segments.stumps.replace(nodes, out);
-                let known = segments.chunks.get(chunk).copied();
-                segments.chunks.extend(self.fit_chunk(entity, segments, known, chunk * SEGMENTS_PER_CHUNK, bounds));
+                segments.contents[chunk].add(bounds, write.added_since(first));
             }
-            let (buffer, first) = (segments.buffer.clone(), run[0] * SEGMENTS_PER_CHUNK);
-            self.writes.0.push(SegmentWrite { buffer, first, segments: written });
+        }
+        // what a longer tree left behind
+        write.extend(len..segments.written.max(len));
+        segments.written = len;
+        self.writes.push(write);
+    }
+
+    /// Gives chunks that changed their boxes, and spawns those that are missing.
+    fn fit_chunks(&mut self, entity: Entity, segments: &mut SegmentBuffer, len: usize) {
+        let full = self.templates.slots();
+        for chunk in 0..segments.contents.len() {
+            let used = (len - chunk * full).min(full);
+            let slots = used.next_power_of_two().clamp(FEWEST_SLOTS, full);
+            let known = segments.chunks.get(chunk).copied();
+            let spawned = self.fit_chunk((entity, segments), known, chunk * full, &segments.contents[chunk], slots);
+            segments.chunks.extend(spawned);
         }
     }
 
-    /// Puts the box around a chunk. Spawns one that is not known yet, and returns it.
+    /// Gives a chunk its box. Spawns one that is not known yet, from its first slot, and returns it.
     pub(super) fn fit_chunk(
         &mut self,
-        entity: Entity,
-        segments: &SegmentBuffer,
+        (entity, segments): (Entity, &SegmentBuffer),
         known: Option<Entity>,
         first: usize,
-        bounds: Option<Aabb3d>,
+        contents: &ChunkContents,
+        slots: usize,
     ) -> Option<Entity> {
-        let aabb = bounds.map_or_else(Aabb::default, |b| Aabb::from_min_max(b.min.into(), b.max.into()));
+        let aabb = contents.bounds.map_or_else(Aabb::default, |b| Aabb::from_min_max(b.min.into(), b.max.into()));
+        let thickest = contents.thickest;
         if let Some(known) = known {
-            if let Ok(mut current) = self.boxes.get_mut(known) {
+            if let Ok((mut current, mut chunk)) = self.drawn.get_mut(known) {
                 current.set_if_neq(aabb);
+                (chunk.thickest, chunk.slots) = (thickest, slots);
             }
             return None;
         }
-        let material = MeshMaterial3d(segments.material.clone());
-        let drawing = (Mesh3d(self.template.0.clone()), material, MeshTag(first as u32));
-        Some(self.commands.spawn((drawing, SegmentChunk, aabb, NoAutoAabb, ChildOf(entity))).id())
+        let drawing = (
+            Mesh3d(self.templates.mesh(0, slots, &mut self.meshes)),
+            MeshMaterial3d(segments.material.clone()),
+            MeshTag(first as u32),
+        );
+        let drawn = SegmentChunk { thickest, slots, level: 0, drawn: (0, slots) };
+        Some(self.commands.spawn((drawing, drawn, aabb, NoAutoAabb, ChildOf(entity))).id())
+    }
+}
+
+/// The parts of a range that lie in one chunk each.
+fn split(range: Range<usize>, slots: usize) -> impl Iterator<Item = Range<usize>> {
+    let chunks = if range.is_empty() { 0..0 } else { range.start / slots..range.end.div_ceil(slots) };
+    chunks.map(move |chunk| range.start.max(chunk * slots)..range.end.min((chunk + 1) * slots))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_split_where_chunks_meet() {
+        let parts = |range: Range<usize>| split(range, 4).collect::<Vec<_>>();
+        assert_eq!(parts(1..3), [1..3]);
+        assert_eq!(parts(0..4), [0..4]);
+        assert_eq!(parts(3..9), [3..4, 4..8, 8..9]);
+        assert_eq!(parts(4..4), [0..0; 0]);
     }
 }

@@ -4,9 +4,13 @@
 // to and where on the template it sits; the segment's end points, radii and colour come from a storage buffer, in which
 // the chunk starts at the mesh tag. Slots without length or thickness collapse to a point and draw nothing. An end with a
 // negative radius was cut: it is flat, and shows its wall and its lumen.
+//
+// As a segment gets small in the picture, its vertices slide to the corners of the next coarser level, and below a pixel
+// segments drop out one by one while the others get wider: see `detail.rs`.
 
 #import bevy_pbr::{
     mesh_bindings::mesh,
+    mesh_view_bindings::view,
     mesh_functions,
     view_transformations::position_world_to_clip,
 }
@@ -28,10 +32,15 @@ struct Segment {
 
 struct TemplateVertex {
     @builtin(instance_index) instance_index: u32,
-    // cosine and sine of the angle around the axis; 0 at the start and 1 at the end
+    // cosine and sine of the angle around the axis, times the reach of the polygon's corners; 0 at the start and 1 at the end
     @location(0) around: vec3<f32>,
     // segment within the chunk; latitude within the round end, 0 at its rim and 1 at its pole
     @location(1) place: vec2<f32>,
+    // where the vertex slides: cosine and sine, latitude
+    @location(2) coarse: vec3<f32>,
+    // radius in pixels below which it has slid all the way; most segments kept, as a share; width in pixels below which
+    // segments drop out
+    @location(3) detail: vec3<f32>,
 }
 
 struct SurfacePoint {
@@ -67,8 +76,35 @@ fn open_end(center: vec3<f32>, radial: vec3<f32>, outward: vec3<f32>, radius: f3
     return SurfacePoint(position, normal, face);
 }
 
-// The point of a segment's surface that a template vertex stands for, in the mesh's local space.
-fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32) -> SurfacePoint {
+// Share by which a segment's threshold may be passed before it is gone, as in `detail.rs`.
+const FADE: f32 = 0.25;
+
+// Pixels of a unit length, in local space, at a point in the world.
+fn pixels_per_length(world_from_local: mat4x4<f32>, world: vec3<f32>) -> f32 {
+    let depth = (view.clip_from_world * vec4(world, 1.0)).w;
+    let axes = mat3x3(world_from_local[0].xyz, world_from_local[1].xyz, world_from_local[2].xyz);
+    let squared = max(dot(axes[0], axes[0]), max(dot(axes[1], axes[1]), dot(axes[2], axes[2])));
+    // behind the camera and at it, everything is large
+    return 0.5 * view.viewport.w * abs(view.clip_from_view[1][1]) * sqrt(squared) / max(depth, 1e-12);
+}
+
+// How much wider than itself an end is drawn: 1 while it is thick enough to be seen. Below that, a share of all segments
+// is kept that falls with their width, and is widened so that all together cover what all would.
+fn widening(slot: u32, radius: f32, detail: vec3<f32>) -> f32 {
+    let kept = clamp(2.0 * radius / max(detail.z, 1e-12), 1e-6, detail.y);
+    if kept >= 1.0 {
+        return 1.0;
+    }
+    let threshold = f32(slot * 0x9e3779b9u) / 4294967296.0;
+    let own = saturate(((1.0 + FADE) * kept - threshold) / (FADE * kept));
+    let rest = 1.0 - kept;
+    let all = select(1.0 - rest * rest / (2.0 * FADE * kept), (1.0 + 0.5 * FADE) * kept, (1.0 + FADE) * kept <= 1.0);
+    return own / all;
+}
+
+// The point of a segment's surface that a template vertex stands for, in the mesh's local space. `around` has the end in
+// its third component.
+fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32, widening: f32) -> SurfacePoint {
     let along = segment.end - segment.start;
     let distance = length(along);
     let radii = abs(vec2(segment.start_radius, segment.end_radius));
@@ -78,12 +114,13 @@ fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32) -> SurfaceP
     let axis = along / distance;
     let other = select(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), abs(axis.x) > 0.7);
     let side = normalize(cross(axis, other));
-    let radial = around.x * side + around.y * cross(axis, side);
+    let reach = length(around.xy);
+    let radial = (around.x * side + around.y * cross(axis, side)) / reach;
 
     let center = mix(segment.start, segment.end, around.z);
-    let radius = mix(radii.x, radii.y, around.z);
+    let radius = widening * mix(radii.x, radii.y, around.z);
     if select(segment.start_radius, segment.end_radius, around.z > 0.5) < 0.0 && latitude > 0.0 {
-        return open_end(center, radial, select(-axis, axis, around.z > 0.5), radius, latitude, segment.color);
+        return open_end(center, radial, select(-axis, axis, around.z > 0.5), reach * radius, latitude, segment.color);
     }
 
     // the cone touches both end spheres, so its normals lean towards the thinner end by this angle
@@ -92,24 +129,35 @@ fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32) -> SurfaceP
     let elevation = mix(lean, pole, latitude);
     let normal = cos(elevation) * radial + sin(elevation) * axis;
     // the start has no rings of its own: a full pole would make a point of it where a vessel begins
-    let reach = select(1.0, START_DOME, latitude == 1.0 && around.z < 0.5);
-    return SurfacePoint(center + reach * radius * normal, normal, segment.color);
+    let dome = select(1.0, START_DOME, latitude == 1.0 && around.z < 0.5);
+    let offset = reach * cos(elevation) * radial + dome * sin(elevation) * axis;
+    return SurfacePoint(center + radius * offset, normal, segment.color);
 }
 
 @vertex
 fn vertex(in: TemplateVertex) -> VertexOutput {
-    let segment = segments[mesh_functions::get_tag(in.instance_index) + u32(in.place.x)];
+    let slot = u32(in.place.x);
+    let segment = segments[mesh_functions::get_tag(in.instance_index) + slot];
+    let world_from_local = mesh_functions::get_world_from_local(in.instance_index);
+
+    let center = mix(segment.start, segment.end, in.around.z);
+    let world_center = mesh_functions::mesh_position_local_to_world(world_from_local, vec4(center, 1.0)).xyz;
+    let radius = mix(abs(segment.start_radius), abs(segment.end_radius), in.around.z) * pixels_per_length(world_from_local, world_center);
+    let slid = saturate(2.0 - radius / max(in.detail.x, 1e-12));
+    // at the end exactly there, which `mix` doesn't promise
+    let across = select(mix(in.around.xy, in.coarse.xy, slid), in.coarse.xy, slid == 1.0);
+    let latitude = select(mix(in.place.y, in.coarse.z, slid), in.coarse.z, slid == 1.0);
+
     // a mirroring transform turns triangles inside out; running around the other way turns them back
     let mirror = mesh_functions::sign_determinant_model_3x3m(mesh[in.instance_index].flags);
-    let around = vec3(in.around.x, in.around.y * mirror, in.around.z);
-    let point = surface_point(segment, around, in.place.y);
-    let world_from_local = mesh_functions::get_world_from_local(in.instance_index);
+    let around = vec3(across.x, across.y * mirror, in.around.z);
+    let point = surface_point(segment, around, latitude, widening(slot, radius, in.detail));
 
     var out: VertexOutput;
     out.world_position = mesh_functions::mesh_position_local_to_world(world_from_local, vec4(point.position, 1.0));
     out.position = position_world_to_clip(out.world_position.xyz);
 #ifdef VERTEX_UVS_A
-    out.uv = vec2(atan2(in.around.y, in.around.x) / (4.0 * QUARTER_TURN) + 0.5, in.around.z);
+    out.uv = vec2(atan2(across.y, across.x) / (4.0 * QUARTER_TURN) + 0.5, in.around.z);
 #endif
 #ifdef VERTEX_COLORS
     out.color = vec4(point.color, 1.0);

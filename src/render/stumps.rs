@@ -7,8 +7,8 @@
 //! undoing, writes the slots of its segments and no others.
 
 use super::{
-    segments::{SegmentBuffer, SegmentStore},
-    template::SEGMENTS_PER_CHUNK,
+    detail::FEWEST_SLOTS,
+    segments::{ChunkContents, SegmentBuffer, SegmentStore},
     upload::SegmentWrite,
 };
 use crate::{
@@ -56,7 +56,7 @@ impl Stumps {
 
     /// Slots that the buffer has to have room for, whole chunks. There is always room for the first cuts.
     pub(super) fn room(&self) -> usize {
-        self.slots.len().next_power_of_two().max(SEGMENTS_PER_CHUNK)
+        self.slots.len().next_power_of_two().max(FEWEST_SLOTS)
     }
 
     /// Takes in what became of the segments in ranges of nodes, and forgets those of nodes from `len` on.
@@ -85,7 +85,8 @@ impl Stumps {
     }
 
     fn insert(&mut self, node: NodeId, pieces: &[SegmentInstance]) {
-        let (own, further) = pieces.split_first().map_or((SegmentInstance::HIDDEN, &[][..]), |(own, rest)| (*own, rest));
+        let (own, further) =
+            pieces.split_first().map_or((SegmentInstance::HIDDEN, &[][..]), |(own, rest)| (*own, rest));
         let mut slots = self.severed.remove(&node.0).map_or_else(Vec::new, |severed| severed.further);
         while slots.len() > further.len() {
             slots.pop().into_iter().for_each(|slot| self.release(slot));
@@ -152,10 +153,11 @@ impl SegmentStore<'_, '_> {
         if stumps.first == first {
             return;
         }
-        let whole_chunks = stumps.slots.len().next_multiple_of(SEGMENTS_PER_CHUNK);
+        let whole_chunks = stumps.slots.len().next_multiple_of(FEWEST_SLOTS);
         for first in [stumps.first, first].into_iter().filter(|_| whole_chunks > 0) {
-            let segments_there = vec![SegmentInstance::HIDDEN; whole_chunks];
-            self.writes.0.push(SegmentWrite { buffer: segments.buffer.clone(), first, segments: segments_there });
+            let mut hidden = SegmentWrite::new(segments.buffer.clone());
+            hidden.extend(first..first + whole_chunks);
+            self.writes.push(hidden);
         }
         stumps.first = first;
         stumps.changed.extend(0..stumps.slots.len() as u32);
@@ -166,21 +168,26 @@ impl SegmentStore<'_, '_> {
 
     /// Queues the stumps that changed, and fits the boxes of their chunks.
     pub(super) fn write_stumps(&mut self, entity: Entity, segments: &mut SegmentBuffer) {
-        let (buffer, first) = (segments.buffer.clone(), segments.stumps.first);
+        let first = segments.stumps.first;
         let changed = segments.stumps.take_changed();
+        let mut write = SegmentWrite::new(segments.buffer.clone());
         for run in &changed {
-            let written = segments.stumps.slots[run.clone()].to_vec();
-            self.writes.0.push(SegmentWrite { buffer: buffer.clone(), first: first + run.start, segments: written });
+            let out = write.extend(first + run.start..first + run.end);
+            out.copy_from_slice(&segments.stumps.slots[run.clone()]);
         }
+        self.writes.push(write);
         let mut chunks: Vec<usize> =
-            changed.iter().flat_map(|run| run.start / SEGMENTS_PER_CHUNK..run.end.div_ceil(SEGMENTS_PER_CHUNK)).collect();
+            changed.iter().flat_map(|run| run.start / FEWEST_SLOTS..run.end.div_ceil(FEWEST_SLOTS)).collect();
         chunks.dedup();
         for chunk in chunks {
-            let slots = &segments.stumps.slots[chunk * SEGMENTS_PER_CHUNK..];
-            let visible = slots.iter().take(SEGMENTS_PER_CHUNK).filter(|segment| segment.is_visible());
-            let bounds = visible.map(SegmentInstance::bounds).reduce(|a, b| a.merge(&b));
+            let slots = segments.stumps.slots[chunk * FEWEST_SLOTS..].iter().take(FEWEST_SLOTS);
+            let visible: Vec<SegmentInstance> = slots.filter(|segment| segment.is_visible()).copied().collect();
+            let bounds = visible.iter().map(SegmentInstance::bounds).reduce(|a, b| a.merge(&b));
+            let mut contents = ChunkContents::default();
+            contents.add(bounds, &visible);
             let known = segments.stumps.chunks.get(chunk).copied();
-            let spawned = self.fit_chunk(entity, segments, known, first + chunk * SEGMENTS_PER_CHUNK, bounds);
+            let at = first + chunk * FEWEST_SLOTS;
+            let spawned = self.fit_chunk((entity, segments), known, at, &contents, FEWEST_SLOTS);
             segments.stumps.chunks.extend(spawned);
         }
     }

@@ -1,80 +1,110 @@
-//! The mesh that all chunks share: copies of a cone with round ends, shaped on the GPU.
+//! The meshes that chunks draw: copies of a cone with round ends, shaped on the GPU, at several levels of detail.
+//!
+//! In: a [`Level`] and a number of slots. Out: a [`Mesh`] whose attributes are read by `segments.wgsl` alone:
+//!
+//! | attribute | holds |
+//! |---|---|
+//! | position | cosine and sine around the axis, and the end: 0 at the start, 1 at the far one |
+//! | normal | where the vertex slides as its segment gets small: cosine, sine, latitude |
+//! | texture coordinate | slot within the chunk; latitude within the round end, 0 at its rim and 1 at its pole |
+//! | [`ATTRIBUTE_DETAIL`] | [`Level::slid_below`], [`Level::most_kept`], [`Level::least_width`] |
+//!
+//! A level's vertices, slid all the way, make the next coarser level, vertex for vertex. So a chunk can go from one mesh to
+//! the next without a visible change.
 
-use crate::plugin::SegmentChanges;
+use super::detail::Level;
 use bevy::{
     asset::RenderAssetUsages,
     math::ops,
-    mesh::{Indices, Mesh, PrimitiveTopology},
+    mesh::{Indices, Mesh, MeshVertexAttribute, PrimitiveTopology, VertexFormat},
 };
 use std::f32::consts::TAU;
 
-/// Segments that one chunk entity draws.
-pub const SEGMENTS_PER_CHUNK: usize = SegmentChanges::CHUNK;
+/// What the vertex stage needs to know about the level that a vertex belongs to.
+pub(super) const ATTRIBUTE_DETAIL: MeshVertexAttribute =
+    MeshVertexAttribute::new("SegmentDetail", 0x7e55_e15d_e7a1, VertexFormat::Float32x3);
 
-/// Builds the chunk mesh: [`SEGMENTS_PER_CHUNK`] copies of a template with `sides` corners around and `cap_rings` rings
-/// between the rim and the pole of its far end.
+/// Builds a mesh of `slots` segments at a level of detail; of those, the ones that the level keeps.
 ///
-/// What the attributes hold is for the shader: the position is cosine and sine around the axis and the end (0 or 1), the
-/// texture coordinate is the segment within the chunk and the latitude within the cap. The near end has a plain cap: it
-/// sits in the round end of the parent segment, and is seen at roots only.
-pub fn chunk_mesh(sides: u32, cap_rings: u32) -> Mesh {
-    let mut template = Template::default();
-    for slot in 0..SEGMENTS_PER_CHUNK {
-        template.push_segment(slot as f32, sides, cap_rings);
+/// The near end has a plain cap: it sits in the round end of the parent segment, and is seen at roots only.
+pub(super) fn chunk_mesh(level: &Level, slots: usize) -> Mesh {
+    let mut template = Template::new(level);
+    for slot in (0..slots).filter(|&slot| level.keeps(slot)) {
+        template.push_segment(slot as f32);
     }
+    let detail = vec![[level.slid_below, level.most_kept(), level.least_width]; template.around.len()];
     // the shapes exist on the GPU alone: a copy in the main world would only mislead picking and bounding boxes
     Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, template.around)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, template.normals)
+        // the shader knows the true normals, but Bevy's normal prepass expects the attribute
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, template.coarse)
         .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, template.place)
+        .with_inserted_attribute(ATTRIBUTE_DETAIL, detail)
         .with_inserted_indices(Indices::U32(template.indices))
 }
 
-#[derive(Default)]
-struct Template {
+struct Template<'a> {
+    level: &'a Level,
     around: Vec<[f32; 3]>,
-    /// Not read by the shader, which knows the true normals; Bevy's normal prepass expects the attribute.
-    normals: Vec<[f32; 3]>,
+    coarse: Vec<[f32; 3]>,
     place: Vec<[f32; 2]>,
     indices: Vec<u32>,
 }
 
-impl Template {
-    fn push_segment(&mut self, slot: f32, sides: u32, cap_rings: u32) {
-        let near_pole = self.push_vertex(slot, [1.0, 0.0, 0.0], 1.0);
-        let near_rim = self.push_ring(slot, sides, 0.0, 0.0);
-        let mut ring = self.push_ring(slot, sides, 1.0, 0.0);
-        self.fan(near_pole, near_rim, sides, true);
-        self.band(near_rim, ring, sides);
-        for cap_ring in 1..=cap_rings {
-            let next = self.push_ring(slot, sides, 1.0, cap_ring as f32 / (cap_rings + 1) as f32);
-            self.band(ring, next, sides);
-            ring = next;
-        }
-        let far_pole = self.push_vertex(slot, [1.0, 0.0, 1.0], 1.0);
-        self.fan(far_pole, ring, sides, false);
+impl<'a> Template<'a> {
+    fn new(level: &'a Level) -> Self {
+        Self { level, around: Vec::new(), coarse: Vec::new(), place: Vec::new(), indices: Vec::new() }
     }
 
-    fn push_vertex(&mut self, slot: f32, around: [f32; 3], latitude: f32) -> u32 {
-        let index = self.around.len() as u32;
-        self.around.push(around);
-        self.normals.push([around[0], around[1], 0.0]);
-        self.place.push([slot, latitude]);
-        index
+    fn push_segment(&mut self, slot: f32) {
+        let rings = self.level.shape.cap_rings;
+        let near_pole = self.push_pole(slot, 0.0);
+        let near_rim = self.push_ring(slot, 0.0, 0);
+        let mut ring = self.push_ring(slot, 1.0, 0);
+        self.fan(near_pole, near_rim, true);
+        self.band(near_rim, ring);
+        for cap_ring in 1..=rings {
+            let next = self.push_ring(slot, 1.0, cap_ring);
+            self.band(ring, next);
+            ring = next;
+        }
+        let far_pole = self.push_pole(slot, 1.0);
+        self.fan(far_pole, ring, false);
+    }
+
+    fn push_pole(&mut self, slot: f32, end: f32) -> u32 {
+        self.push_vertex(slot, [1.0, 0.0, end], 1.0, [1.0, 0.0, 1.0])
     }
 
     /// A ring of vertices, counter-clockwise seen from the far end; returns its first index.
-    fn push_ring(&mut self, slot: f32, sides: u32, end: f32, latitude: f32) -> u32 {
+    fn push_ring(&mut self, slot: f32, end: f32, cap_ring: u32) -> u32 {
         let first = self.around.len() as u32;
-        for side in 0..sides {
-            let (sin, cos) = ops::sin_cos(TAU * side as f32 / sides as f32);
-            self.push_vertex(slot, [cos, sin, end], latitude);
+        let (own, next) = (self.level.shape, self.level.next);
+        let latitude = cap_ring as f32 / (own.cap_rings + 1) as f32;
+        // the ring of the coarser cap at or below this one
+        let coarse_ring = cap_ring * (next.cap_rings + 1) / (own.cap_rings + 1);
+        let coarse_latitude = coarse_ring as f32 / (next.cap_rings + 1) as f32;
+        for side in 0..own.sides {
+            let [cos, sin] = corner(side, own.sides);
+            // the nearest corner of the coarser polygon: every one of its corners is some vertex's goal, in the same order
+            let goal = (2 * side * next.sides + own.sides) / (2 * own.sides) % next.sides;
+            let [coarse_cos, coarse_sin] = corner(goal, next.sides);
+            self.push_vertex(slot, [cos, sin, end], latitude, [coarse_cos, coarse_sin, coarse_latitude]);
         }
         first
     }
 
+    fn push_vertex(&mut self, slot: f32, around: [f32; 3], latitude: f32, coarse: [f32; 3]) -> u32 {
+        let index = self.around.len() as u32;
+        self.around.push(around);
+        self.coarse.push(coarse);
+        self.place.push([slot, latitude]);
+        index
+    }
+
     /// Two triangles per side between a ring and the next one towards the far end.
-    fn band(&mut self, near: u32, far: u32, sides: u32) {
+    fn band(&mut self, near: u32, far: u32) {
+        let sides = self.level.shape.sides;
         for side in 0..sides {
             let next = (side + 1) % sides;
             let (a, b, c, d) = (near + side, near + next, far + next, far + side);
@@ -83,7 +113,8 @@ impl Template {
     }
 
     /// One triangle per side between a pole and its ring.
-    fn fan(&mut self, pole: u32, ring: u32, sides: u32, near_end: bool) {
+    fn fan(&mut self, pole: u32, ring: u32, near_end: bool) {
+        let sides = self.level.shape.sides;
         for side in 0..sides {
             let (a, b) = (ring + side, ring + (side + 1) % sides);
             self.indices.extend(if near_end { [pole, b, a] } else { [pole, a, b] });
@@ -91,28 +122,62 @@ impl Template {
     }
 }
 
+/// A corner of the polygon that stands for a circle of radius 1, as wide as the circle on the mean over all directions.
+fn corner(side: u32, sides: u32) -> [f32; 2] {
+    let (sin, cos) = ops::sin_cos(TAU * side as f32 / sides as f32);
+    let reach = corner_reach(sides);
+    [reach * cos, reach * sin]
+}
+
+/// Distance of a regular polygon's corners from its centre, where its mean width is 2.
+///
+/// The mean width of a convex figure is its perimeter over π (Cauchy).
+pub(super) fn corner_reach(sides: u32) -> f32 {
+    let half_turn = TAU / 2.0 / sides as f32;
+    half_turn / ops::sin(half_turn)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bevy::mesh::VertexAttributeValues;
+    use crate::render::detail::{Detail, Shape};
+    use bevy::{math::Vec3, mesh::VertexAttributeValues};
     use std::collections::BTreeSet;
+
+    const SLOTS: usize = 8;
+
+    fn levels() -> Vec<Level> {
+        let detail = |sides, cap_rings| Detail { shape: Shape { sides, cap_rings }, tolerance: 0.25, least_width: 1.0 };
+        [detail(3, 0), detail(8, 1), detail(13, 3)].iter().flat_map(Detail::levels).collect()
+    }
+
+    fn indices(mesh: &Mesh) -> &[u32] {
+        let Some(Indices::U32(indices)) = mesh.indices() else { panic!("32-bit indices") };
+        indices
+    }
+
+    fn attribute(mesh: &Mesh, attribute: MeshVertexAttribute) -> Vec<Vec3> {
+        match mesh.attribute(attribute) {
+            Some(VertexAttributeValues::Float32x3(values)) => values.iter().copied().map(Vec3::from).collect(),
+            Some(VertexAttributeValues::Float32x2(values)) => {
+                values.iter().map(|v| Vec3::new(v[0], v[1], 0.0)).collect()
+            }
+            _ => panic!("two or three floats"),
+        }
+    }
 
     /// Directed edges of the first segment's triangles.
     fn first_segment_edges(mesh: &Mesh, vertices: u32) -> Vec<(u32, u32)> {
-        let Some(Indices::U32(indices)) = mesh.indices() else { panic!("32-bit indices") };
-        indices
-            .chunks(3)
-            .filter(|triangle| triangle[0] < vertices)
-            .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
-            .collect()
+        let triangles = indices(mesh).chunks(3).filter(|triangle| triangle[0] < vertices);
+        triangles.flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]).collect()
     }
 
     #[test]
     fn every_segment_is_a_closed_oriented_surface() {
-        for (sides, cap_rings) in [(3, 0), (8, 1), (12, 3)] {
-            let mesh = chunk_mesh(sides, cap_rings);
-            let vertices = (2 + sides * (2 + cap_rings)) as usize;
-            assert_eq!(mesh.count_vertices(), vertices * SEGMENTS_PER_CHUNK);
+        for level in levels() {
+            let mesh = chunk_mesh(&level, SLOTS);
+            let vertices = level.shape.vertices();
+            assert_eq!(mesh.count_vertices(), vertices * (0..SLOTS).filter(|&slot| level.keeps(slot)).count());
             let edges = first_segment_edges(&mesh, vertices as u32);
             let unique: BTreeSet<_> = edges.iter().copied().collect();
             assert_eq!(unique.len(), edges.len(), "no edge is used twice in one direction");
@@ -124,24 +189,67 @@ mod tests {
 
     #[test]
     fn triangles_face_outwards() {
-        let mesh = chunk_mesh(8, 1);
-        let Some(VertexAttributeValues::Float32x3(around)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION) else {
-            panic!("three floats")
-        };
-        let Some(Indices::U32(indices)) = mesh.indices() else { panic!("32-bit indices") };
-        // the template as a cylinder: sides only, where normals are radial
-        let sides = indices.chunks(3).filter(|t| t.iter().all(|&i| mesh_latitude(&mesh, i) == 0.0));
-        for triangle in sides.take(16) {
-            let [a, b, c] = [0, 1, 2].map(|k| bevy::math::Vec3::from(around[triangle[k] as usize]));
-            let outwards = (a + b + c) * bevy::math::Vec3::new(1.0, 1.0, 0.0);
-            assert!((b - a).cross(c - a).dot(outwards) > 0.0);
+        for level in levels() {
+            let mesh = chunk_mesh(&level, SLOTS);
+            let (around, place) = (attribute(&mesh, Mesh::ATTRIBUTE_POSITION), attribute(&mesh, Mesh::ATTRIBUTE_UV_0));
+            // the template as a cylinder: sides only, where normals are radial
+            let sides = indices(&mesh).chunks(3).filter(|t| t.iter().all(|&i| place[i as usize].y == 0.0));
+            for triangle in sides {
+                let [a, b, c] = [0, 1, 2].map(|k| around[triangle[k] as usize]);
+                let outwards = (a + b + c) * Vec3::new(1.0, 1.0, 0.0);
+                assert!((b - a).cross(c - a).dot(outwards) > 0.0);
+            }
         }
     }
 
-    fn mesh_latitude(mesh: &Mesh, vertex: u32) -> f32 {
-        let Some(VertexAttributeValues::Float32x2(place)) = mesh.attribute(Mesh::ATTRIBUTE_UV_0) else {
-            panic!("two floats")
+    /// A triangle as three points in the space of the template: around, latitude, slot. Those without area are left out.
+    type Corner = [i32; 5];
+    fn surface(mesh: &Mesh, slid: bool, kept: impl Fn(usize) -> bool) -> BTreeSet<[Corner; 3]> {
+        let [around, coarse, place] =
+            [Mesh::ATTRIBUTE_POSITION, Mesh::ATTRIBUTE_NORMAL, Mesh::ATTRIBUTE_UV_0].map(|a| attribute(mesh, a));
+        let corner = |i: u32| {
+            let i = i as usize;
+            let (across, latitude) = if slid { (coarse[i], coarse[i].z) } else { (around[i], place[i].y) };
+            // all points of a cap with latitude 1 are its pole
+            let across = if latitude == 1.0 { Vec3::ZERO } else { across };
+            let exact = |x: f32| (x * 1e4).round() as i32;
+            [exact(across.x), exact(across.y), around[i].z as i32, exact(latitude), place[i].x as i32]
         };
-        place[vertex as usize][1]
+        let triangles = indices(mesh).chunks(3).map(|t| [corner(t[0]), corner(t[1]), corner(t[2])]);
+        triangles
+            .filter(|[a, b, c]| a != b && b != c && c != a && kept(a[4] as usize))
+            .map(|mut corners| {
+                // the same triangle begins at any of its corners
+                let first = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
+                corners.rotate_left(first);
+                corners
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_level_slid_all_the_way_is_the_next_level() {
+        for pair in levels().windows(2).filter(|pair| pair[0].next == pair[1].shape && pair[1].stride >= pair[0].stride)
+        {
+            let [fine, coarse] = [&pair[0], &pair[1]].map(|level| chunk_mesh(level, 16 * SLOTS));
+            let slid = surface(&fine, true, |slot| pair[1].keeps(slot));
+            assert!(!slid.is_empty());
+            assert_eq!(slid, surface(&coarse, false, |_| true), "{:?} to {:?}", pair[0], pair[1]);
+        }
+    }
+
+    #[test]
+    fn polygons_are_as_wide_as_the_circle_on_the_mean() {
+        for sides in [3, 5, 8, 16] {
+            let directions = 3600;
+            let width = |direction: i32| {
+                let (sin, cos) = ops::sin_cos(TAU * direction as f32 / directions as f32);
+                let along = (0..sides).map(|side| corner(side, sides)).map(|[x, y]| x * cos + y * sin);
+                let (low, high) = along.fold((f32::MAX, f32::MIN), |(low, high), x| (low.min(x), high.max(x)));
+                high - low
+            };
+            let mean = (0..directions).map(width).sum::<f32>() / directions as f32;
+            assert!((mean - 2.0).abs() < 1e-3, "{sides} sides are {mean} wide");
+        }
     }
 }

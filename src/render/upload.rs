@@ -1,33 +1,89 @@
 //! The way of segments from the main world into their buffer on the GPU.
 //!
-//! A change of the tree queues the chunks that it touched as [`SegmentWrite`]s. Extraction moves the queue, not the bytes,
-//! and [`write_segments_to_gpu`] copies them into the buffers by ranges. The buffer asset itself holds no data and changes
-//! only to grow, which keeps its contents, by a copy on the GPU.
+//! A change of the tree queues exactly the segments that it touched as a [`SegmentWrite`]. Extraction moves the queue, not
+//! the bytes, and [`write_segments_to_gpu`] copies them into the buffers: one run of slots as it is, scattered ones by a
+//! compute shader, since thousands of small copies would cost more than what they save. The buffer asset itself holds no
+//! data and changes only to grow, which keeps its contents, by a copy on the GPU.
 
 use crate::synthesis::instances::SegmentInstance;
 use bevy::{
+    asset::load_embedded_asset,
     prelude::*,
     render::{
         MainWorld,
         render_asset::RenderAssets,
-        renderer::RenderQueue,
+        render_resource::{
+            BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer, BufferInitDescriptor,
+            BufferUsages, CachedComputePipelineId, CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline,
+            ComputePipelineDescriptor, PipelineCache, ShaderStages,
+            binding_types::{storage_buffer_read_only_sized, storage_buffer_sized},
+        },
+        renderer::{RenderDevice, RenderQueue},
         storage::{GpuShaderBuffer, ShaderBuffer},
     },
 };
+use std::ops::Range;
 
-/// Segments on their way to a range of a buffer.
+/// Segments on their way to slots of a buffer.
+#[derive(Debug)]
 pub(super) struct SegmentWrite {
     /// Keeps the buffer alive until it was written, so that a write can't wait forever for one that is gone.
-    pub buffer: Handle<ShaderBuffer>,
-    /// Slot of the first segment.
-    pub first: usize,
-    /// What is written from there on.
-    pub segments: Vec<SegmentInstance>,
+    buffer: Handle<ShaderBuffer>,
+    /// Where they go, each slot once.
+    slots: Vec<u32>,
+    segments: Vec<SegmentInstance>,
+}
+
+impl SegmentWrite {
+    /// Segments that are scattered at once: what a dispatch of one dimension can do, and little enough to be staged.
+    const MOST_SCATTERED: usize = 1 << 20;
+
+    pub(super) fn new(buffer: Handle<ShaderBuffer>) -> Self {
+        Self { buffer, slots: Vec::new(), segments: Vec::new() }
+    }
+
+    /// Number of segments.
+    pub(super) fn len(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// Adds hidden segments for a range of slots, to be filled in.
+    pub(super) fn extend(&mut self, slots: Range<usize>) -> &mut [SegmentInstance] {
+        let first = self.len();
+        self.segments.resize(first + slots.len(), SegmentInstance::HIDDEN);
+        self.slots.extend(slots.map(|slot| slot as u32));
+        &mut self.segments[first..]
+    }
+
+    /// Segments added after the first so many.
+    pub(super) fn added_since(&self, first: usize) -> &[SegmentInstance] {
+        &self.segments[first..]
+    }
+
+    /// The slots, if they follow one another.
+    fn run(&self) -> Option<Range<usize>> {
+        let first = *self.slots.first()? as usize;
+        self.slots.is_sorted_by(|a, b| a + 1 == *b).then(|| first..first + self.len())
+    }
+
+    /// Slots that the buffer must have.
+    fn end(&self) -> usize {
+        self.slots.iter().max().map_or(0, |&last| last as usize + 1)
+    }
 }
 
 /// Writes that wait: in the main world for extraction, in the render world for their buffer to be there.
-#[derive(Resource, Default)]
-pub(super) struct SegmentWrites(pub Vec<SegmentWrite>);
+#[derive(Resource, Debug, Default)]
+pub(super) struct SegmentWrites(Vec<SegmentWrite>);
+
+impl SegmentWrites {
+    /// Queues a write, unless there is nothing in it.
+    pub(super) fn push(&mut self, write: SegmentWrite) {
+        if write.len() > 0 {
+            self.0.push(write);
+        }
+    }
+}
 
 /// Moves queued writes to the render world.
 pub(super) fn extract_writes(mut main: ResMut<MainWorld>, mut writes: ResMut<SegmentWrites>) {
@@ -37,30 +93,123 @@ pub(super) fn extract_writes(mut main: ResMut<MainWorld>, mut writes: ResMut<Seg
     }
 }
 
+/// The compute pipeline that scatters segments.
+#[derive(Resource)]
+pub(super) struct ScatterPipeline {
+    layout: BindGroupLayoutDescriptor,
+    pipeline: CachedComputePipelineId,
+}
+
+/// Asks for the pipeline.
+pub(super) fn queue_scatter_pipeline(mut commands: Commands, assets: Res<AssetServer>, cache: Res<PipelineCache>) {
+    let layout = BindGroupLayoutDescriptor::new(
+        "scatter segments",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::COMPUTE,
+            (
+                storage_buffer_sized(false, None),
+                storage_buffer_read_only_sized(false, None),
+                storage_buffer_read_only_sized(false, None),
+            ),
+        ),
+    );
+    let pipeline = cache.queue_compute_pipeline(ComputePipelineDescriptor {
+        label: Some("scatter segments".into()),
+        layout: vec![layout.clone()],
+        shader: load_embedded_asset!(assets.as_ref(), "scatter.wgsl"),
+        entry_point: Some("scatter".into()),
+        ..default()
+    });
+    commands.insert_resource(ScatterPipeline { layout, pipeline });
+}
+
 /// Copies waiting segments into those buffers that have room for them; the others are tried again in the next frame.
 pub(super) fn write_segments_to_gpu(
     mut writes: ResMut<SegmentWrites>,
     buffers: Res<RenderAssets<GpuShaderBuffer>>,
-    queue: Res<RenderQueue>,
+    scatter: Res<ScatterPipeline>,
+    cache: Res<PipelineCache>,
+    (device, queue): (Res<RenderDevice>, Res<RenderQueue>),
 ) {
     if writes.0.is_empty() {
         return;
     }
+    let pipeline = cache.get_compute_pipeline(scatter.pipeline);
     let mut waiting = Vec::new();
-    writes.0.retain(|SegmentWrite { buffer, first, segments }| {
-        let bytes: &[u8] = bytemuck::cast_slice(segments);
-        let offset = (first * SegmentInstance::SIZE) as u64;
-        let room = buffers.get(buffer).filter(|gpu| offset + bytes.len() as u64 <= gpu.buffer.size());
-        match room {
-            // what was queued earlier is written earlier: a later write may replace parts of it
-            Some(gpu) if !waiting.contains(&buffer.id()) => {
-                queue.write_buffer(&gpu.buffer, offset, bytes);
-                false
-            }
-            _ => {
-                waiting.push(buffer.id());
+    writes.0.retain(|write| {
+        let bytes = (write.end() * SegmentInstance::SIZE) as u64;
+        let room = buffers.get(&write.buffer).map(|gpu| &gpu.buffer).filter(|buffer| bytes <= buffer.size());
+        // what was queued earlier is written earlier: a later write may replace parts of it
+        let written = match (room.filter(|_| !waiting.contains(&write.buffer.id())), write.run(), pipeline) {
+            (Some(buffer), Some(run), _) => {
+                let offset = (run.start * SegmentInstance::SIZE) as u64;
+                queue.write_buffer(buffer, offset, bytemuck::cast_slice(&write.segments));
                 true
             }
+            (Some(buffer), None, Some(pipeline)) => {
+                scatter.run(pipeline, write, buffer, &cache, &device, &queue);
+                true
+            }
+            _ => false,
+        };
+        if !written {
+            waiting.push(write.buffer.id());
         }
+        !written
     });
+}
+
+impl ScatterPipeline {
+    fn run(
+        &self,
+        pipeline: &ComputePipeline,
+        write: &SegmentWrite,
+        buffer: &Buffer,
+        cache: &PipelineCache,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+    ) {
+        let staged = |label, contents| {
+            device.create_buffer_with_data(&BufferInitDescriptor { label, contents, usage: BufferUsages::STORAGE })
+        };
+        let layout = cache.get_bind_group_layout(&self.layout);
+        let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor { label: Some("scatter segments") });
+        let most = SegmentWrite::MOST_SCATTERED;
+        for (slots, segments) in write.slots.chunks(most).zip(write.segments.chunks(most)) {
+            let staged_slots = staged(Some("changed slots"), bytemuck::cast_slice(slots));
+            let staged_segments = staged(Some("changed segments"), bytemuck::cast_slice(segments));
+            let entries = BindGroupEntries::sequential((
+                buffer.as_entire_binding(),
+                staged_slots.as_entire_binding(),
+                staged_segments.as_entire_binding(),
+            ));
+            let group = device.create_bind_group("scatter segments", &layout, &entries);
+            let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(slots.len().div_ceil(64) as u32, 1, 1);
+        }
+        queue.submit([encoder.finish()]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_that_follow_one_another_are_a_run() {
+        let write = |ranges: &[Range<usize>]| {
+            let mut write = SegmentWrite::new(Handle::default());
+            for range in ranges {
+                write.extend(range.clone());
+            }
+            write
+        };
+        assert_eq!(write(&[3..5, 5..9]).run(), Some(3..9));
+        assert_eq!((write(&[3..5, 6..9]).run(), write(&[3..5, 6..9]).end()), (None, 9));
+        assert_eq!(write(&[5..6, 4..5]).run(), None);
+        assert_eq!((write(&[]).run(), write(&[]).end()), (None, 0));
+        assert!(write(&[0..2]).added_since(0).iter().all(|segment| *segment == SegmentInstance::HIDDEN));
+    }
 }

@@ -59,8 +59,8 @@ impl Pack {
     pub(crate) fn overlaps(&self, (min, max): Corners) -> u8 {
         let mut meets = [true; LANES];
         for axis in 0..3 {
-            for lane in 0..LANES {
-                meets[lane] &= (self.min[axis][lane] <= max[axis]) & (self.max[axis][lane] >= min[axis]);
+            for (lane, meets) in meets.iter_mut().enumerate() {
+                *meets &= (self.min[axis][lane] <= max[axis]) & (self.max[axis][lane] >= min[axis]);
             }
         }
         bits(meets)
@@ -78,9 +78,9 @@ impl Pack {
     pub(crate) fn distances_squared(&self, point: Vec3) -> [f32; LANES] {
         let mut sums = [0.0; LANES];
         for axis in 0..3 {
-            for lane in 0..LANES {
+            for (lane, sum) in sums.iter_mut().enumerate() {
                 let outside = (self.min[axis][lane] - point[axis]).max(point[axis] - self.max[axis][lane]).max(0.0);
-                sums[lane] += outside * outside;
+                *sum += outside * outside;
             }
         }
         sums.map(|sum| sum * SHORTENED)

@@ -7,6 +7,8 @@
 
 #[path = "../../examples/common/headless.rs"]
 mod headless;
+
+mod detail;
 mod stage;
 
 use bevy::{
@@ -18,11 +20,14 @@ use bevy::{
 use bevy_vessels::{
     VesselPlugin,
     plugin::{SegmentChanges, SegmentColoring, VesselAppearance, VesselSystem, Vessels, VesselsOf},
-    render::{SEGMENTS_PER_CHUNK, SegmentBuffer, SegmentLimits, SegmentMaterial},
+    render::{SegmentBuffer, SegmentLimits, SegmentMaterial},
     synthesis::tree::{NO_PARENT, System, VesselTree},
 };
 use headless::headless_plugins;
 use stage::{Picture, SIZE, on_stage};
+
+/// Segments per chunk at the default roundness.
+const CHUNK: usize = 4096;
 
 /// A tree of the given nodes: position, parent, radius.
 fn tree(nodes: &[([f32; 3], u32, f32)]) -> VesselTree {
@@ -121,7 +126,7 @@ fn slots_without_a_segment_are_invisible() {
 #[test]
 fn growth_appears_through_range_writes_and_larger_buffers() {
     on_stage("growth", |stage| {
-        let full = comb(SEGMENTS_PER_CHUNK);
+        let full = comb(CHUNK);
         let organ = stage.spawn(System::Arterial, &comb(2));
         let before = stage.picture();
         // half of the comb is one chunk, all of it two: the second picture needs a larger buffer and a new chunk
@@ -139,22 +144,41 @@ fn growth_appears_through_range_writes_and_larger_buffers() {
 #[test]
 fn only_marked_ranges_are_written_again() {
     on_stage("ranges", |stage| {
-        let organ = stage.spawn(System::Arterial, &comb(SEGMENTS_PER_CHUNK));
+        let organ = stage.spawn(System::Arterial, &comb(CHUNK));
         let before = stage.picture();
-        // everything moved out of view, but only the second chunk was said to have changed
-        let gone = tree(&vec![([500.0, 0.0, 0.0], NO_PARENT, 1.0); 2 * SEGMENTS_PER_CHUNK]);
-        stage.replace(organ, &gone, SEGMENTS_PER_CHUNK..SEGMENTS_PER_CHUNK + 1);
+        // everything moved out of view, but only the second half was said to have changed
+        let gone = tree(&vec![([500.0, 0.0, 0.0], NO_PARENT, 1.0); 2 * CHUNK]);
+        stage.replace(organ, &gone, CHUNK..2 * CHUNK);
         let after = stage.picture();
         assert!(before.is_vessel(64 - 40, 64) && before.is_vessel(64 + 40, 64));
-        assert!(after.is_vessel(64 - 40, 64), "the first chunk is as it was");
+        assert!(after.is_vessel(64 - 40, 64), "the first half is as it was");
         assert!(after.is_background(64 + 40, 64), "the second one is gone");
+    });
+}
+
+#[test]
+fn scattered_changes_reach_their_slots_and_no_others() {
+    on_stage("scattered", |stage| {
+        let organ = stage.spawn(System::Arterial, &comb(28));
+        let before = stage.picture();
+        // all teeth but the first are moved out of view, and every third is said to have changed
+        let mut nodes = vec![([500.0, 0.0, 0.0], NO_PARENT, 2.0); 56];
+        (nodes[1].0, nodes[1].1) = ([500.0, 9.0, 0.0], 0);
+        let changed: Vec<usize> = (0..28).filter(|tooth| tooth % 3 == 1).flat_map(|t| [2 * t, 2 * t + 1]).collect();
+        stage.replace_nodes(organ, &tree(&nodes), &changed);
+        let after = stage.picture();
+        for tooth in 0..28 {
+            let x = (64.0 - 56.0 + 112.0 * tooth as f32 / 27.0) as usize;
+            assert!(before.is_vessel(x, 64), "tooth {tooth}");
+            assert_eq!(after.is_background(x, 64), tooth % 3 == 1, "tooth {tooth}");
+        }
     });
 }
 
 #[test]
 fn a_restart_clears_what_was_there() {
     on_stage("restart", |stage| {
-        let organ = stage.spawn(System::Arterial, &comb(SEGMENTS_PER_CHUNK));
+        let organ = stage.spawn(System::Arterial, &comb(CHUNK));
         stage.picture();
         stage.replace(organ, &bar(), 0..2);
         let picture = stage.picture();

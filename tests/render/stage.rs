@@ -140,6 +140,7 @@ impl Stage {
             world.despawn(prop);
         }
         (self.name, self.pictures) = (name, 0);
+        self.set_shadows(true);
         // dropped handles free their assets a frame later
         self.app.update();
         self.app.update();
@@ -177,8 +178,13 @@ impl Stage {
         self.app.world().get::<OrganVessels>(organ).expect("an organ with vessels").entities()[0]
     }
 
-    /// Gives an organ another tree, of which `changed` nodes are said to be different.
+    /// Gives an organ another tree, of which `changed` nodes are said to be different, or all, where there are none.
     pub fn replace(&mut self, organ: Entity, tree: &VesselTree, changed: Range<usize>) {
+        self.replace_nodes(organ, tree, &changed.collect::<Vec<_>>());
+    }
+
+    /// [`replace`](Self::replace), with nodes here and there.
+    pub fn replace_nodes(&mut self, organ: Entity, tree: &VesselTree, changed: &[usize]) {
         let vessels = self.vessels(organ);
         let mut vessels = self.app.world_mut().entity_mut(vessels);
         vessels.insert(Vessels::from_tree(tree, &[]));
@@ -186,7 +192,15 @@ impl Stage {
         if changed.is_empty() {
             changes.mark_all();
         }
-        changed.for_each(|node| changes.mark_node(node));
+        changed.iter().for_each(|&node| changes.mark_node(node));
+    }
+
+    /// Lets lights cast shadows, or not.
+    pub fn set_shadows(&mut self, cast: bool) {
+        let world = self.app.world_mut();
+        for mut light in world.query::<&mut DirectionalLight>().iter_mut(world) {
+            light.shadow_maps_enabled = cast;
+        }
     }
 
     pub fn appearance(&mut self, organ: Entity, change: impl FnOnce(&mut VesselAppearance)) {
@@ -295,6 +309,20 @@ impl Picture {
     /// Sum of the channels, 0 to 765, of encoded values.
     pub fn brightness(&self, x: usize, y: usize) -> f32 {
         self.at(x, y).map(f32::from).iter().sum()
+    }
+
+    /// Pixels that differ between two pictures, by more than a channel's last bit.
+    pub fn differing(&self, other: &Self) -> usize {
+        let pixels = (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y)));
+        let differ =
+            |&(x, y): &(usize, usize)| self.at(x, y).iter().zip(other.at(x, y)).any(|(a, b)| a.abs_diff(b) > 1);
+        pixels.filter(differ).count()
+    }
+
+    /// Mean [`brightness`](Self::brightness) of all pixels.
+    pub fn mean_brightness(&self) -> f32 {
+        let rows = (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y)));
+        rows.map(|(x, y)| self.brightness(x, y)).sum::<f32>() / (SIZE * SIZE) as f32
     }
 
     /// Vessel pixels in a column.

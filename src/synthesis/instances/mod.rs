@@ -68,10 +68,7 @@ impl SegmentInstance {
     pub fn bounds(&self) -> Aabb3d {
         let (start, end) = (Vec3A::from(self.start), Vec3A::from(self.end));
         let [start_radius, end_radius] = self.radii();
-        Aabb3d {
-            min: (start - start_radius).min(end - end_radius),
-            max: (start + start_radius).max(end + end_radius),
-        }
+        Aabb3d { min: (start - start_radius).min(end - end_radius), max: (start + start_radius).max(end + end_radius) }
     }
 }
 
@@ -166,7 +163,8 @@ mod tests {
 
     #[test]
     fn open_ends_are_as_wide_as_closed_ones() {
-        let closed = SegmentInstance { start_radius: 0.5, end: [2.0, 0.0, 0.0], end_radius: 0.25, ..Default::default() };
+        let closed =
+            SegmentInstance { start_radius: 0.5, end: [2.0, 0.0, 0.0], end_radius: 0.25, ..Default::default() };
         let open = SegmentInstance { start_radius: -0.5, end_radius: -0.25, ..closed };
         assert_eq!((open.bounds(), open.radii(), open.is_visible()), (closed.bounds(), [0.5, 0.25], true));
         assert_eq!((closed.is_open(), open.is_open()), ([false; 2], [true; 2]));

@@ -135,7 +135,7 @@ fn nearest_pairs(samples: &[TissuePoint]) -> Vec<(u32, u32)> {
     for (sample, point) in points.iter().enumerate() {
         // One more, since the nearest is the sample itself.
         let nearest = index.query(point).nearest_n::<SquaredEuclidean<f32>>(LINKS.saturating_add(1)).execute();
-        let others = nearest.iter().map(|found| found.item as u32).filter(|&other| other != sample as u32);
+        let others = nearest.iter().map(|found| found.item).filter(|&other| other != sample as u32);
         pairs.extend(others.map(|other| (other.min(sample as u32), other.max(sample as u32))));
     }
     pairs.sort_unstable();
