@@ -79,7 +79,8 @@ fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>
             SegmentColoring::System => SegmentColoring::Radius,
             SegmentColoring::Radius => SegmentColoring::Age,
             SegmentColoring::Age => SegmentColoring::StrahlerOrder,
-            SegmentColoring::StrahlerOrder => SegmentColoring::System,
+            SegmentColoring::StrahlerOrder => SegmentColoring::Supply,
+            SegmentColoring::Supply => SegmentColoring::System,
         };
     }
 }

@@ -3,7 +3,7 @@
 use super::{
     headless::{OffscreenTarget, PipelinesReady, write_picture},
     light::Endoscope,
-    studio::{StudioArgs, View, transform_of},
+    studio::{StudioArgs, transform_of},
 };
 use bevy::{
     asset::RenderAssetUsages,
@@ -22,6 +22,15 @@ use std::{io, time::Duration};
 /// The pictures to take once the vessels are grown.
 #[derive(Resource, Clone, Default)]
 pub struct Shots(pub Vec<Shot>);
+
+/// Whether pictures will be wanted beyond those in [`Shots`]: then the app goes on after the last.
+#[derive(Resource, Clone, Copy, Default)]
+pub struct MoreShots {
+    /// Whether there will be any.
+    pub expected: bool,
+    /// How many of [`Shots`] were taken, or can't be.
+    pub taken: usize,
+}
 
 /// A picture to take.
 #[derive(Clone)]
@@ -42,6 +51,7 @@ pub struct PhotoPlugin;
 impl Plugin for PhotoPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Session>()
+            .init_resource::<MoreShots>()
             .add_systems(Update, (give_up, grow.run_if(not(grown)), photograph.run_if(grown)).chain());
     }
 }
@@ -98,14 +108,23 @@ fn grow(
 fn photograph(
     mut commands: Commands,
     mut session: ResMut<Session>,
-    scene: (Res<Shots>, Res<View>, Res<StudioArgs>),
+    (shots, args): (Res<Shots>, Res<StudioArgs>),
+    mut more: ResMut<MoreShots>,
     offscreen: Option<(Res<OffscreenTarget>, Res<PipelinesReady>)>,
     mut endoscope: Option<ResMut<Endoscope>>,
     mut camera: Query<(&mut Camera, &mut Transform, &mut Projection)>,
     networks: Networks,
     mut exit: MessageWriter<AppExit>,
 ) {
-    let (shots, _, args) = scene;
+    more.taken = if offscreen.is_some() { session.shot } else { shots.0.len() };
+    let is_wanted = more.taken < shots.0.len();
+    // between pictures nobody looks
+    for (mut camera, ..) in camera.iter_mut().filter(|(camera, ..)| camera.is_active != is_wanted) {
+        camera.is_active = is_wanted;
+    }
+    if !is_wanted && more.expected {
+        return;
+    }
     let (Some(shot), Some((target, ready))) = (shots.0.get(session.shot), offscreen) else {
         networks.write(&args);
         networks.print_figures(&mut session.frame_times);

@@ -201,6 +201,9 @@ pub enum SegmentColoring {
     Age,
     /// Its Strahler order: 1 for terminals, rising towards the root.
     StrahlerOrder,
+    /// How much of its blood it still carries: the system's colour where that is all, pale where it is none. Of use once
+    /// vessels are cut or clamped.
+    Supply,
 }
 
 /// How an organ's vessels look.

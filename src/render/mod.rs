@@ -5,7 +5,8 @@
 //!
 //! A vessel entity, however large, is a handful of chunk entities that share a few meshes: many copies of a template cone
 //! with round ends. The vertex stage looks up each copy's end points and radii in a storage buffer and shapes it there.
-//! Growth rewrites only the slots that changed; with nothing changed, nothing happens. Chunks are children of the vessel
+//! Growth rewrites only the slots that changed; with nothing changed, nothing happens. Severed segments show what is left of
+//! them, see `stumps`, with a view into the lumen. Chunks are children of the vessel
 //! entity, which is a child of the organ: transforms, visibility and despawning follow the hierarchy. Each chunk has its own
 //! bounding box, so parts outside the view are not drawn; and each has the level of detail that its size in the picture asks
 //! for.
@@ -35,6 +36,7 @@ use bevy::{
 mod detail;
 mod material;
 mod segments;
+mod stumps;
 mod template;
 mod upload;
 

@@ -4,10 +4,14 @@ use super::{
     SegmentLimits,
     detail::{ChunkMeshes, FEWEST_SLOTS},
     material::{SegmentExtension, SegmentMaterial, VesselMaterials},
+    stumps::Stumps,
     upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
-    plugin::{SegmentChanges, SegmentColoring, VesselAppearance, VesselSystem, Vessels, VesselsOf},
+    plugin::{
+        SegmentChanges, SegmentColoring, SegmentSupply, VesselAppearance, VesselSystem, VesselWounds, Vessels,
+        VesselsOf,
+    },
     synthesis::{
         instances::{SegmentColors, SegmentInstance, write_segments},
         tree::System,
@@ -29,7 +33,7 @@ use std::ops::Range;
 /// Added to entities with [`Vessels`] and removed with them.
 #[derive(Component, Debug)]
 pub struct SegmentBuffer {
-    buffer: Handle<ShaderBuffer>,
+    pub(super) buffer: Handle<ShaderBuffer>,
     material: Handle<SegmentMaterial>,
     /// Segments that the buffer has room for.
     capacity: usize,
@@ -43,6 +47,10 @@ pub struct SegmentBuffer {
     /// The appearance that `colors` follow, `None` at first.
     look: Option<Look>,
     warned_of_limit: bool,
+    /// What severed segments show.
+    pub(super) stumps: Stumps,
+    /// Slots that the buffer has for stumps, behind those of the nodes.
+    room: usize,
 }
 
 impl SegmentBuffer {
@@ -53,7 +61,8 @@ impl SegmentBuffer {
 
     /// The buffer that holds this vessel entity's segments, one
     /// [`SegmentInstance`](crate::synthesis::instances::SegmentInstance) per node, for materials and compute shaders of
-    /// your own. It is on the GPU only, and moves when it grows: ask again after the handle's asset was modified.
+    /// your own. From [`capacity`](Self::capacity) on follow the pieces of severed segments beside the first of each, in no
+    /// order. It is on the GPU only, and moves when it grows: ask again after the handle's asset was modified.
     pub fn buffer(&self) -> &Handle<ShaderBuffer> {
         &self.buffer
     }
@@ -63,7 +72,12 @@ impl SegmentBuffer {
         &self.chunks
     }
 
-    /// Segments that fit before the buffer has to grow.
+    /// The entities that draw the further pieces of severed segments, children of the vessel entity.
+    pub fn stump_chunks(&self) -> &[Entity] {
+        self.stumps.chunks()
+    }
+
+    /// Nodes' segments that fit before the buffer has to grow.
     pub fn capacity(&self) -> usize {
         self.capacity
     }
@@ -91,17 +105,17 @@ impl SegmentChunk {
 
 /// What a chunk's box and thickness follow from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct ChunkContents {
+pub(super) struct ChunkContents {
     bounds: Option<Aabb3d>,
     thickest: f32,
 }
 
 impl ChunkContents {
     /// Takes in segments within a box. While vessels grow, what they were before lies within what they are now.
-    fn add(&mut self, bounds: Option<Aabb3d>, segments: &[SegmentInstance]) {
+    pub(super) fn add(&mut self, bounds: Option<Aabb3d>, segments: &[SegmentInstance]) {
         let Some(new) = bounds else { return };
         self.bounds = Some(self.bounds.map_or(new, |old| old.merge(&new)));
-        let radii = segments.iter().map(|segment| segment.start_radius.max(segment.end_radius));
+        let radii = segments.iter().flat_map(SegmentInstance::radii);
         self.thickest = radii.fold(self.thickest, f32::max);
     }
 }
@@ -110,21 +124,25 @@ impl ChunkContents {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Look {
     Uniform([f32; 3]),
+    Supply([f32; 3]),
     Ramp(SegmentColoring),
 }
 
 impl Look {
     fn new(appearance: &VesselAppearance, system: System) -> Self {
-        if appearance.coloring != SegmentColoring::System {
-            return Self::Ramp(appearance.coloring);
+        let own = appearance.color(system).to_linear().to_f32_array_no_alpha();
+        match appearance.coloring {
+            SegmentColoring::System => Self::Uniform(own),
+            SegmentColoring::Supply => Self::Supply(own),
+            ramp => Self::Ramp(ramp),
         }
-        Self::Uniform(appearance.color(system).to_linear().to_f32_array_no_alpha())
     }
 
     fn colors(self) -> SegmentColors {
         match self {
             Self::Uniform(color) => SegmentColors::Uniform(color),
-            Self::Ramp(SegmentColoring::System) => SegmentColors::Uniform([1.0; 3]),
+            Self::Supply(full) => SegmentColors::Supply { full, levels: Vec::new() },
+            Self::Ramp(SegmentColoring::System | SegmentColoring::Supply) => SegmentColors::Uniform([1.0; 3]),
             Self::Ramp(SegmentColoring::Radius) => SegmentColors::RADIUS,
             Self::Ramp(SegmentColoring::Age) => SegmentColors::AGE,
             Self::Ramp(SegmentColoring::StrahlerOrder) => SegmentColors::STRAHLER,
@@ -141,8 +159,9 @@ pub(super) fn attach_buffers(
     mut materials: ResMut<Assets<SegmentMaterial>>,
 ) {
     for (entity, system) in &new {
-        let capacity = FEWEST_SLOTS;
-        let mut buffer = ShaderBuffer::with_size(capacity * SegmentInstance::SIZE, RenderAssetUsages::default());
+        let (capacity, stumps) = (FEWEST_SLOTS, Stumps::default());
+        let bytes = (capacity + stumps.room()) * SegmentInstance::SIZE;
+        let mut buffer = ShaderBuffer::with_size(bytes, RenderAssetUsages::default());
         buffer.buffer_description.label = Some("vessel segments");
         let buffer = buffers.add(buffer);
         let extension = SegmentExtension { segments: buffer.clone() };
@@ -157,6 +176,8 @@ pub(super) fn attach_buffers(
             colors: SegmentColors::Uniform([1.0; 3]),
             look: None,
             warned_of_limit: false,
+            room: stumps.room(),
+            stumps,
         });
     }
 }
@@ -164,7 +185,7 @@ pub(super) fn attach_buffers(
 /// Removes what was drawn of an entity that lost its vessels but lives on.
 pub(super) fn detach_buffer(removed: On<Remove, Vessels>, mut commands: Commands, buffers: Query<&SegmentBuffer>) {
     if let Ok(buffer) = buffers.get(removed.entity) {
-        for &chunk in &buffer.chunks {
+        for &chunk in buffer.chunks.iter().chain(buffer.stump_chunks()) {
             commands.entity(chunk).try_despawn();
         }
         commands.entity(removed.entity).try_remove::<SegmentBuffer>();
@@ -174,12 +195,12 @@ pub(super) fn detach_buffer(removed: On<Remove, Vessels>, mut commands: Commands
 /// Everything that drawing segments writes to.
 #[derive(SystemParam)]
 pub(super) struct SegmentStore<'w, 's> {
-    commands: Commands<'w, 's>,
+    pub(super) commands: Commands<'w, 's>,
     drawn: Query<'w, 's, (&'static mut Aabb, &'static mut SegmentChunk)>,
     buffers: ResMut<'w, Assets<ShaderBuffer>>,
     materials: ResMut<'w, Assets<SegmentMaterial>>,
     meshes: ResMut<'w, Assets<Mesh>>,
-    writes: ResMut<'w, SegmentWrites>,
+    pub(super) writes: ResMut<'w, SegmentWrites>,
     templates: ResMut<'w, ChunkMeshes>,
     limits: Res<'w, SegmentLimits>,
 }
@@ -193,6 +214,8 @@ pub(super) struct DrawnVessels {
     system: &'static VesselSystem,
     organ: &'static VesselsOf,
     changes: &'static mut SegmentChanges,
+    wounds: Option<&'static VesselWounds>,
+    supply: Option<Ref<'static, SegmentSupply>>,
     segments: &'static mut SegmentBuffer,
 }
 
@@ -205,66 +228,85 @@ pub(super) fn update_segments(
     for mut drawn in &mut drawn {
         let appearance = appearances.get(drawn.organ.0).ok();
         let restyled = drawn.segments.look.is_none() || appearance.as_ref().is_some_and(Ref::is_changed);
-        if drawn.changes.is_empty() && !restyled {
+        let blanched = drawn.segments.follows_supply() && drawn.supply.as_ref().is_some_and(Ref::is_changed);
+        if drawn.changes.is_empty() && !restyled && !blanched {
             continue;
         }
         let look = match appearance {
             Some(appearance) => Look::new(&appearance, drawn.system.0),
             None => Look::new(&VesselAppearance::default(), drawn.system.0),
         };
-        let len = store.drawable(drawn.entity, drawn.vessels.tree().len(), &mut drawn.segments);
+        let (vessels, segments) = (drawn.vessels, &mut *drawn.segments);
+        let nodes = vessels.tree().len();
+        let supply = drawn.supply.as_ref().map_or(&[][..], |supply| &supply.segments[..]);
         let changes = drawn.changes.bypass_change_detection();
-        drawn.segments.adopt(look, drawn.vessels, changes);
-        store.resize(&mut drawn.segments, len);
-        store.write(drawn.vessels, changes, &mut drawn.segments, len);
-        store.fit_chunks(drawn.entity, &mut drawn.segments, len);
+        segments.adopt(look, vessels, supply, changes);
+        let wounds = drawn.wounds.map(|wounds| &**wounds);
+        segments.stumps.update(wounds, vessels, &segments.colors, changes.dirty_ranges(nodes), nodes);
+        let len = store.drawable(drawn.entity, nodes, segments);
+        store.resize(segments, len);
+        store.write(vessels, changes, segments, len);
+        store.fit_chunks(drawn.entity, segments, len);
+        store.write_stumps(drawn.entity, segments);
         changes.clear();
     }
 }
 
 impl SegmentBuffer {
-    /// Adopts the look, and marks the segments that have another colour now.
-    fn adopt(&mut self, look: Look, vessels: &Vessels, changes: &mut SegmentChanges) {
+    /// Whether colours tell the supply.
+    fn follows_supply(&self) -> bool {
+        matches!(self.look, Some(Look::Supply(_)))
+    }
+
+    /// Adopts look and supply, and marks the segments that have another colour now.
+    fn adopt(&mut self, look: Look, vessels: &Vessels, supply: &[f32], changes: &mut SegmentChanges) {
         let (tree, births) = (vessels.tree(), vessels.birth_steps());
         if self.look != Some(look) {
             self.look = Some(look);
             self.colors = look.colors();
             self.colors.refresh(tree, births, [0..tree.len()]);
+            self.colors.set_supply(supply);
             changes.mark_all();
             return;
         }
-        for recolored in self.colors.refresh(tree, births, changes.dirty_ranges(tree.len())) {
+        let recolored = self.colors.refresh(tree, births, changes.dirty_ranges(tree.len()));
+        for recolored in recolored.into_iter().chain(self.colors.set_supply(supply)) {
             recolored.for_each(|node| changes.mark_node(node));
         }
     }
 }
 
 impl SegmentStore<'_, '_> {
-    /// How many of `len` nodes can be drawn; says so once when those are not all.
+    /// How many of `len` nodes can be drawn beside the stumps; says so once when those are not all.
     fn drawable(&self, entity: Entity, len: usize, segments: &mut SegmentBuffer) -> usize {
-        let most = self.limits.max_segments();
+        let stumps = segments.stumps.room();
+        let most = self.limits.max_segments().saturating_sub(stumps);
         if len > most && !segments.warned_of_limit {
             segments.warned_of_limit = true;
             warn!(
-                "vessels {entity} have {len} nodes but this GPU's storage buffers hold {most}: the rest is not drawn. \
-                 Grow several organs or fewer vessels."
+                "vessels {entity} have {len} nodes but this GPU's storage buffers hold {most}, beside {stumps} pieces of \
+                 severed vessels: the rest is not drawn. Grow several organs or fewer vessels."
             );
         }
         len.min(most)
     }
 
-    /// Makes room for `len` segments and drops the chunks beyond them.
+    /// Makes room for `len` segments and for the stumps, and drops the chunks beyond them.
     fn resize(&mut self, segments: &mut SegmentBuffer, len: usize) {
-        if len > segments.capacity {
-            segments.capacity = len.next_power_of_two().min(self.limits.max_segments());
+        let most = self.limits.max_segments();
+        let room = segments.stumps.room().min(most);
+        if len > segments.capacity || room > segments.room {
+            let wanted = if len > segments.capacity { len.next_power_of_two() } else { segments.capacity };
+            (segments.capacity, segments.room) = (wanted.min(most - room), room);
             if let Some(mut buffer) = self.buffers.get_mut(&segments.buffer) {
-                buffer.resize_in_place((segments.capacity * SegmentInstance::SIZE) as u64);
+                buffer.resize_in_place(((segments.capacity + room) * SegmentInstance::SIZE) as u64);
             }
             // a mutable look at the material makes its bind group anew, with the larger buffer
             if let Some(mut material) = self.materials.get_mut(&segments.material) {
                 material.extension.segments = segments.buffer.clone();
             }
         }
+        self.move_stumps(segments);
         let needed = len.div_ceil(self.templates.slots());
         segments.contents.resize(needed, ChunkContents::default());
         for chunk in segments.chunks.drain(needed.min(segments.chunks.len())..) {
@@ -283,7 +325,9 @@ impl SegmentStore<'_, '_> {
             for nodes in split(range, slots) {
                 let (chunk, first) = (nodes.start / slots, write.len());
                 let out = write.extend(nodes.clone());
-                let bounds = write_segments(vessels.tree(), vessels.birth_steps(), nodes, &segments.colors, out);
+                let (tree, births) = (vessels.tree(), vessels.birth_steps());
+                let bounds = write_segments(tree, births, nodes.clone(), &segments.colors, out);
+                segments.stumps.replace(nodes, out);
                 segments.contents[chunk].add(bounds, write.added_since(first));
             }
         }
@@ -296,25 +340,40 @@ impl SegmentStore<'_, '_> {
     /// Gives chunks that changed their boxes, and spawns those that are missing.
     fn fit_chunks(&mut self, entity: Entity, segments: &mut SegmentBuffer, len: usize) {
         let full = self.templates.slots();
-        for (chunk, contents) in segments.contents.iter().enumerate() {
-            let aabb = contents.bounds.map_or_else(Aabb::default, |b| Aabb::from_min_max(b.min.into(), b.max.into()));
+        for chunk in 0..segments.contents.len() {
             let used = (len - chunk * full).min(full);
-            let (thickest, slots) = (contents.thickest, used.next_power_of_two().clamp(FEWEST_SLOTS, full));
-            if let Some(&known) = segments.chunks.get(chunk) {
-                if let Ok((mut current, mut chunk)) = self.drawn.get_mut(known) {
-                    current.set_if_neq(aabb);
-                    (chunk.thickest, chunk.slots) = (thickest, slots);
-                }
-                continue;
-            }
-            let drawing = (
-                Mesh3d(self.templates.mesh(0, slots, &mut self.meshes)),
-                MeshMaterial3d(segments.material.clone()),
-                MeshTag((chunk * full) as u32),
-            );
-            let drawn = SegmentChunk { thickest, slots, level: 0, drawn: (0, slots) };
-            segments.chunks.push(self.commands.spawn((drawing, drawn, aabb, NoAutoAabb, ChildOf(entity))).id());
+            let slots = used.next_power_of_two().clamp(FEWEST_SLOTS, full);
+            let known = segments.chunks.get(chunk).copied();
+            let spawned = self.fit_chunk((entity, segments), known, chunk * full, &segments.contents[chunk], slots);
+            segments.chunks.extend(spawned);
         }
+    }
+
+    /// Gives a chunk its box. Spawns one that is not known yet, from its first slot, and returns it.
+    pub(super) fn fit_chunk(
+        &mut self,
+        (entity, segments): (Entity, &SegmentBuffer),
+        known: Option<Entity>,
+        first: usize,
+        contents: &ChunkContents,
+        slots: usize,
+    ) -> Option<Entity> {
+        let aabb = contents.bounds.map_or_else(Aabb::default, |b| Aabb::from_min_max(b.min.into(), b.max.into()));
+        let thickest = contents.thickest;
+        if let Some(known) = known {
+            if let Ok((mut current, mut chunk)) = self.drawn.get_mut(known) {
+                current.set_if_neq(aabb);
+                (chunk.thickest, chunk.slots) = (thickest, slots);
+            }
+            return None;
+        }
+        let drawing = (
+            Mesh3d(self.templates.mesh(0, slots, &mut self.meshes)),
+            MeshMaterial3d(segments.material.clone()),
+            MeshTag(first as u32),
+        );
+        let drawn = SegmentChunk { thickest, slots, level: 0, drawn: (0, slots) };
+        Some(self.commands.spawn((drawing, drawn, aabb, NoAutoAabb, ChildOf(entity))).id())
     }
 }
 

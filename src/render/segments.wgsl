@@ -2,7 +2,8 @@
 //
 // The mesh is one template, a cone with round ends, many times over. A vertex says which segment of the chunk it belongs
 // to and where on the template it sits; the segment's end points, radii and colour come from a storage buffer, in which
-// the chunk starts at the mesh tag. Slots without length or thickness collapse to a point and draw nothing.
+// the chunk starts at the mesh tag. Slots without length or thickness collapse to a point and draw nothing. An end with a
+// negative radius was cut: it is flat, and shows its wall and its lumen.
 //
 // As a segment gets small in the picture, its vertices slide to the corners of the next coarser level, and below a pixel
 // segments drop out one by one while the others get wider: see `detail.rs`.
@@ -45,6 +46,7 @@ struct TemplateVertex {
 struct SurfacePoint {
     position: vec3<f32>,
     normal: vec3<f32>,
+    color: vec3<f32>,
 }
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(100) var<storage, read> segments: array<Segment>;
@@ -53,6 +55,26 @@ const QUARTER_TURN: f32 = 1.5707963;
 
 // Height of the shallow dome that closes a segment's start, in radii.
 const START_DOME: f32 = 0.4;
+
+// Width of the lumen that an open end shows, as a share of the vessel's, and how deep one looks into it, in radii. Walls are
+// drawn thicker than the tenth of the calibre that they have in arteries, or they would not be seen.
+const LUMEN: f32 = 0.7;
+const LUMEN_DEPTH: f32 = 1.2;
+// The cut wall is paler than the vessel's outside, and the lumen is dark with blood. Linear sRGB.
+const CUT_WALL: vec3<f32> = vec3(0.62, 0.36, 0.3);
+const LUMEN_BLOOD: vec3<f32> = vec3(0.03, 0.001, 0.002);
+
+// The face of a cut: from the rim, at latitude 0, over the wall to the lumen's edge at 0.5, then down into it.
+fn open_end(center: vec3<f32>, radial: vec3<f32>, outward: vec3<f32>, radius: f32, latitude: f32, color: vec3<f32>) -> SurfacePoint {
+    let over_wall = saturate(2.0 * latitude);
+    let into_lumen = saturate(2.0 * latitude - 1.0);
+    let across = mix(1.0, LUMEN, over_wall) * (1.0 - into_lumen);
+    let position = center + radius * (across * radial - LUMEN_DEPTH * into_lumen * outward);
+    // the wall lies across the vessel, the lumen's inside looks towards its axis
+    let normal = normalize(mix(mix(radial, outward, over_wall), outward - radial, into_lumen * (1.0 - into_lumen)));
+    let face = mix(mix(color, CUT_WALL, over_wall), LUMEN_BLOOD, select(into_lumen, 1.0, into_lumen > 0.0));
+    return SurfacePoint(position, normal, face);
+}
 
 // Share by which a segment's threshold may be passed before it is gone, as in `detail.rs`.
 const FADE: f32 = 0.25;
@@ -85,9 +107,9 @@ fn widening(slot: u32, radius: f32, detail: vec3<f32>) -> f32 {
 fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32, widening: f32) -> SurfacePoint {
     let along = segment.end - segment.start;
     let distance = length(along);
-    let thickest = max(segment.start_radius, segment.end_radius);
-    if distance == 0.0 || thickest <= 0.0 {
-        return SurfacePoint(segment.start, vec3(0.0, 0.0, 1.0));
+    let radii = abs(vec2(segment.start_radius, segment.end_radius));
+    if distance == 0.0 || max(radii.x, radii.y) <= 0.0 {
+        return SurfacePoint(segment.start, vec3(0.0, 0.0, 1.0), segment.color);
     }
     let axis = along / distance;
     let other = select(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), abs(axis.x) > 0.7);
@@ -95,17 +117,21 @@ fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32, widening: f
     let reach = length(around.xy);
     let radial = (around.x * side + around.y * cross(axis, side)) / reach;
 
+    let center = mix(segment.start, segment.end, around.z);
+    let radius = widening * mix(radii.x, radii.y, around.z);
+    if select(segment.start_radius, segment.end_radius, around.z > 0.5) < 0.0 && latitude > 0.0 {
+        return open_end(center, radial, select(-axis, axis, around.z > 0.5), reach * radius, latitude, segment.color);
+    }
+
     // the cone touches both end spheres, so its normals lean towards the thinner end by this angle
-    let lean = asin(clamp((segment.start_radius - segment.end_radius) / distance, -0.999, 0.999));
+    let lean = asin(clamp((radii.x - radii.y) / distance, -0.999, 0.999));
     let pole = select(-QUARTER_TURN, QUARTER_TURN, around.z > 0.5);
     let elevation = mix(lean, pole, latitude);
     let normal = cos(elevation) * radial + sin(elevation) * axis;
-    let center = mix(segment.start, segment.end, around.z);
-    let radius = widening * mix(segment.start_radius, segment.end_radius, around.z);
     // the start has no rings of its own: a full pole would make a point of it where a vessel begins
     let dome = select(1.0, START_DOME, latitude == 1.0 && around.z < 0.5);
     let offset = reach * cos(elevation) * radial + dome * sin(elevation) * axis;
-    return SurfacePoint(center + radius * offset, normal);
+    return SurfacePoint(center + radius * offset, normal, segment.color);
 }
 
 @vertex
@@ -116,7 +142,7 @@ fn vertex(in: TemplateVertex) -> VertexOutput {
 
     let center = mix(segment.start, segment.end, in.around.z);
     let world_center = mesh_functions::mesh_position_local_to_world(world_from_local, vec4(center, 1.0)).xyz;
-    let radius = mix(segment.start_radius, segment.end_radius, in.around.z) * pixels_per_length(world_from_local, world_center);
+    let radius = mix(abs(segment.start_radius), abs(segment.end_radius), in.around.z) * pixels_per_length(world_from_local, world_center);
     let slid = saturate(2.0 - radius / max(in.detail.x, 1e-12));
     // at the end exactly there, which `mix` doesn't promise
     let across = select(mix(in.around.xy, in.coarse.xy, slid), in.coarse.xy, slid == 1.0);
@@ -134,7 +160,7 @@ fn vertex(in: TemplateVertex) -> VertexOutput {
     out.uv = vec2(atan2(across.y, across.x) / (4.0 * QUARTER_TURN) + 0.5, in.around.z);
 #endif
 #ifdef VERTEX_COLORS
-    out.color = vec4(segment.color, 1.0);
+    out.color = vec4(point.color, 1.0);
 #endif
 #ifdef VERTEX_OUTPUT_INSTANCE_INDEX
     out.instance_index = in.instance_index;

@@ -20,8 +20,8 @@ fn cut_at(wounds: &mut Wounds, tree: &VesselTree, x: f32) {
     assert_eq!(wounds.cut(&blade, tree, all(tree)).severed, 1, "at {x}");
 }
 
-#[test]
-fn the_gap_that_is_drawn_is_the_gap_of_the_ledger() {
+/// What is drawn of a vessel that was cut twice, against the ledger. `domes` have the heights of round ends, in radii.
+fn assert_gaps(sealed: bool, domes: [f32; 2]) {
     for (radii, long) in [(1.5, 1.0), (0.5, 1.0), (1.5, 0.1), (0.0, 0.03)] {
         // Vessels from slender to thicker than long.
         let whole = straight(1);
@@ -30,20 +30,36 @@ fn the_gap_that_is_drawn_is_the_gap_of_the_ledger() {
         let mut wounds = Wounds::new(Retraction { radii, length: 0.0 }).unwrap();
         cut_at(&mut wounds, &tree, 0.6 * long);
         cut_at(&mut wounds, &tree, 0.3 * long);
+        if sealed {
+            let everywhere = Blade::ball(Vec3::ZERO, 2.0).expect("a ball");
+            wounds.cauterise(&everywhere, f32::INFINITY, &tree, all(&tree)).expect("a volume");
+        }
         let drawn = stumps(&wounds, &tree);
         let pieces: Vec<_> = wounds.pieces(NodeId(1)).collect();
         assert_eq!((drawn.len(), pieces.len()), (3, 3));
         for (index, (instance, piece)) in drawn.iter().zip(&pieces).enumerate() {
             assert!(instance.is_visible(), "{instance:?}");
-            // The shader draws a full round end, and at the start a dome of 0.4 radii.
-            let begins = instance.start[0] - if index > 0 { 0.4 * instance.start_radius } else { 0.0 };
-            let ends = instance.end[0] + if index < 2 { instance.end_radius } else { 0.0 };
+            let cut = [index > 0, index < 2];
+            assert_eq!(instance.is_open(), cut.map(|cut| cut && !sealed));
+            let [start, end] = [0, 1].map(|side| if cut[side] { domes[side] * instance.radii()[side] } else { 0.0 });
+            let (begins, ends) = (instance.start[0] - start, instance.end[0] + end);
             let tolerance = 1e-6;
             assert!((begins - piece.from * long).abs() < tolerance && (ends - piece.to * long).abs() < tolerance);
             assert!(instance.start[0] < instance.end[0]);
         }
         assert_eq!((drawn[0].start_radius, drawn[2].end_radius), (0.05, 0.05), "where it is whole it is as before");
     }
+}
+
+#[test]
+fn the_gap_that_is_drawn_is_the_gap_of_the_ledger() {
+    assert_gaps(false, [0.0, 0.0]);
+}
+
+#[test]
+fn the_round_ends_of_sealed_cuts_stay_out_of_the_gap() {
+    // The shader draws a full round end, and at the start a dome of 0.4 radii.
+    assert_gaps(true, [0.4, 1.0]);
 }
 
 #[test]
@@ -66,9 +82,21 @@ fn pieces_share_colour_birth_and_taper_with_the_whole() {
     assert_eq!((out[0].start, out[0].start_radius), (whole[2].start, whole[2].start_radius));
     assert_eq!((out[1].end, out[1].end_radius), (whole[2].end, whole[2].end_radius));
     // Three tenths of the way from 0.06 to 0.05.
-    assert!((out[0].end_radius - 0.057).abs() < 1e-6);
+    assert!((out[0].end_radius + 0.057).abs() < 1e-6, "open, so with a minus");
     wounds.undo_all(&tree);
     assert!(stumps(&wounds, &tree).is_empty());
+}
+
+#[test]
+fn severed_segments_are_found_by_range() {
+    let tree = straight(5);
+    let mut wounds = Wounds::default();
+    [0.5, 2.5, 4.5].into_iter().for_each(|x| cut_at(&mut wounds, &tree, x));
+    wounds.clamp(Place::new(NodeId(2), 0.5), &tree).unwrap();
+    let within = |range| wounds.severed_within(range).map(|node| node.0).collect::<Vec<_>>();
+    assert_eq!((within(0..9), within(2..5), within(3..4)), (vec![1, 3, 5], vec![3], vec![3]));
+    assert!(within(2..3).is_empty() && within(4..4).is_empty());
+    assert_eq!(wounds.severed_segments().count(), 3);
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! What colour a segment gets: its system's, or one on a ramp by radius, age or Strahler order.
+//! What colour a segment gets: its system's, one on a ramp by radius, age or Strahler order, or its system's as far as
+//! blood still comes.
 
 use crate::synthesis::tree::VesselTree;
 use bevy_math::ops;
@@ -29,11 +30,25 @@ pub enum SegmentColors {
         /// Order of every node, from 1.
         orders: Vec<u32>,
     },
+    /// By supply: full colour where a segment carries all its blood, pale where it carries none.
+    Supply {
+        /// Colour of full supply, linear sRGB.
+        full: [f32; 3],
+        /// Supply of every node, from 0 to [`Self::SUPPLY_LEVELS`]. Nodes beyond the end are supplied.
+        levels: Vec<u32>,
+    },
 }
 
 impl SegmentColors {
     /// Number of orders that are told apart; higher ones share the last colour. Grown trees have 6 to 9.
     pub const STRAHLER_LEVELS: u32 = 9;
+
+    /// Steps of supply that are told apart. More would show no better, and have segments written anew with every beat of
+    /// the heart.
+    pub const SUPPLY_LEVELS: u32 = 32;
+
+    /// Colour of a vessel without blood, linear sRGB: wall alone.
+    pub const BLOODLESS: [f32; 3] = [0.52, 0.46, 0.42];
 
     /// Colours by radius, of a tree not yet seen.
     pub const RADIUS: Self = Self::Radius { thinnest: 0.0, widest: 0.0 };
@@ -56,7 +71,7 @@ impl SegmentColors {
     ) -> Vec<Range<usize>> {
         let whole = 0..tree.len();
         match self {
-            Self::Uniform(_) => Vec::new(),
+            Self::Uniform(_) | Self::Supply { .. } => Vec::new(),
             Self::Radius { thinnest, widest } => {
                 let radii = changed.into_iter().flat_map(|range| &tree.radii()[range]);
                 if widen_radii(thinnest, widest, radii) { vec![whole] } else { Vec::new() }
@@ -80,6 +95,32 @@ impl SegmentColors {
         }
     }
 
+    /// Takes in the supply of every node, from 0 to 1, where colours follow that. Nodes beyond the end of `supply` count as
+    /// supplied.
+    ///
+    /// Returns ranges of nodes whose colour is another now. A supply that wavers at the limit between two steps changes
+    /// nothing.
+    pub fn set_supply(&mut self, supply: &[f32]) -> Vec<Range<usize>> {
+        let Self::Supply { levels, .. } = self else { return Vec::new() };
+        let all = Self::SUPPLY_LEVELS;
+        let known = levels.iter().copied().chain(std::iter::repeat(all));
+        let level = |(&supply, known): (&f32, u32)| {
+            let exact = supply.clamp(0.0, 1.0) * all as f32;
+            // `as` takes NaN to 0
+            if (exact - known as f32).abs() <= Self::SUPPLY_REST { known } else { (exact + 0.5) as u32 }
+        };
+        let mut new: Vec<u32> = supply.iter().zip(known).map(level).collect();
+        let len = new.len().max(levels.len());
+        new.resize(len, all);
+        levels.resize(len, all);
+        let ranges = differing_ranges(levels, &new);
+        *levels = new;
+        ranges
+    }
+
+    /// How far a supply has to be from its step to take another, in steps.
+    const SUPPLY_REST: f32 = 0.75;
+
     /// Linear sRGB of one segment.
     pub fn color(&self, radius: f32, birth: u32, node: usize) -> [f32; 3] {
         match self {
@@ -91,6 +132,11 @@ impl SegmentColors {
             Self::Strahler { orders } => {
                 let order = orders.get(node).copied().unwrap_or(1);
                 ramp_color(order.saturating_sub(1) as f32 / (Self::STRAHLER_LEVELS - 1) as f32)
+            }
+            Self::Supply { full, levels } => {
+                let level = levels.get(node).copied().unwrap_or(Self::SUPPLY_LEVELS);
+                let share = level as f32 / Self::SUPPLY_LEVELS as f32;
+                std::array::from_fn(|i| Self::BLOODLESS[i] + (full[i] - Self::BLOODLESS[i]) * share)
             }
         }
     }
@@ -234,6 +280,24 @@ mod tests {
         assert_eq!(colors.color(0.25, 0, 0), ramp_color(0.0));
         assert_eq!(SegmentColors::AGE.color(0.1, 0, 0), ramp_color(0.0));
         assert_eq!(SegmentColors::STRAHLER.color(0.1, 0, 9), ramp_color(0.0));
+    }
+
+    #[test]
+    fn supply_blanches_in_steps_that_rest() {
+        let full = [0.3, 0.0, 0.0];
+        let mut colors = SegmentColors::Supply { full, levels: Vec::new() };
+        assert_eq!(colors.color(1.0, 0, 7), full, "what nothing is known of is supplied");
+        assert!(colors.set_supply(&[1.0; 6]).is_empty());
+        assert_eq!(colors.set_supply(&[1.0, 0.5, 0.0, 1.0, 0.25]), [1..3, 4..5]);
+        assert_eq!((colors.color(1.0, 0, 2), colors.color(1.0, 0, 5)), (SegmentColors::BLOODLESS, full));
+        let half = colors.color(1.0, 0, 1);
+        let middle = 0.5 * (full[0] + SegmentColors::BLOODLESS[0]);
+        assert!((half[0] - middle).abs() < 1e-6, "{half:?}");
+        let rest = 0.7 / SegmentColors::SUPPLY_LEVELS as f32;
+        assert!(colors.set_supply(&[1.0 - rest, 0.5 + rest, rest, 1.0, 0.25 - rest]).is_empty());
+        assert_eq!(colors.set_supply(&[f32::NAN]), [0..3, 4..5], "shorter: the rest is supplied again");
+        assert_eq!(colors.color(1.0, 0, 0), SegmentColors::BLOODLESS);
+        assert!(SegmentColors::RADIUS.set_supply(&[0.0; 6]).is_empty());
     }
 
     #[test]

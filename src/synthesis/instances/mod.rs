@@ -22,16 +22,18 @@ pub use colors::{SegmentColors, ramp_color};
 pub const MAX_FLARE: f32 = 1.3;
 
 /// One vessel segment: a cone with round ends, in tissue lengths.
+///
+/// An end at which the vessel was cut is open: flat, with a view into the lumen. Its radius is stored as a negative number.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SegmentInstance {
     /// Centre of the end towards the root.
     pub start: [f32; 3],
-    /// Radius at `start`.
+    /// Radius at `start`, negative where that is [open](Self::is_open).
     pub start_radius: f32,
     /// Centre of the end towards the tips.
     pub end: [f32; 3],
-    /// Radius at `end`.
+    /// Radius at `end`, negative where that is open.
     pub end_radius: f32,
     /// Linear sRGB.
     pub color: [f32; 3],
@@ -49,16 +51,24 @@ impl SegmentInstance {
 
     /// Whether the segment has a length and a thickness.
     pub fn is_visible(&self) -> bool {
-        self.start != self.end && (self.start_radius > 0.0 || self.end_radius > 0.0)
+        self.start != self.end && self.radii() != [0.0; 2]
+    }
+
+    /// Radii at `start` and `end`, not negative.
+    pub fn radii(&self) -> [f32; 2] {
+        [self.start_radius.abs(), self.end_radius.abs()]
+    }
+
+    /// Whether the vessel was cut at `start`, at `end`, and one looks into its lumen there.
+    pub fn is_open(&self) -> [bool; 2] {
+        [self.start_radius < 0.0, self.end_radius < 0.0]
     }
 
     /// The box around the segment, its round ends included.
     pub fn bounds(&self) -> Aabb3d {
         let (start, end) = (Vec3A::from(self.start), Vec3A::from(self.end));
-        Aabb3d {
-            min: (start - self.start_radius).min(end - self.end_radius),
-            max: (start + self.start_radius).max(end + self.end_radius),
-        }
+        let [start_radius, end_radius] = self.radii();
+        Aabb3d { min: (start - start_radius).min(end - end_radius), max: (start + start_radius).max(end + end_radius) }
     }
 }
 
@@ -149,6 +159,16 @@ mod tests {
         });
         assert_eq!(floats, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]);
         assert_eq!(SegmentInstance::HIDDEN, bytemuck::Zeroable::zeroed());
+    }
+
+    #[test]
+    fn open_ends_are_as_wide_as_closed_ones() {
+        let closed =
+            SegmentInstance { start_radius: 0.5, end: [2.0, 0.0, 0.0], end_radius: 0.25, ..Default::default() };
+        let open = SegmentInstance { start_radius: -0.5, end_radius: -0.25, ..closed };
+        assert_eq!((open.bounds(), open.radii(), open.is_visible()), (closed.bounds(), [0.5, 0.25], true));
+        assert_eq!((closed.is_open(), open.is_open()), ([false; 2], [true; 2]));
+        assert!(!SegmentInstance { start_radius: -0.0, end_radius: -0.0, ..closed }.is_visible());
     }
 
     #[test]

@@ -5,12 +5,13 @@
 //! injured segment from both sides.
 
 use super::crossing::segment;
-use super::injury::{Gap, Injury};
+use super::injury::{Gap, Injury, Tip};
 use super::{EndId, Wounds};
 use crate::synthesis::haemodynamics::{Interruption, Outlet};
 use crate::synthesis::instances::{SegmentColors, SegmentInstance, segment_instance};
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
 use bevy_math::Vec3;
+use std::ops::Range;
 
 /// Which piece of a severed segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -78,7 +79,12 @@ impl Wounds {
 
     /// The severed segments, in the order of their nodes.
     pub fn severed_segments(&self) -> impl Iterator<Item = NodeId> + '_ {
-        self.injuries().filter(|(_, injury)| !injury.gaps().is_empty()).map(|(node, _)| node)
+        self.severed_within(0..usize::MAX)
+    }
+
+    /// The severed segments of a range of nodes, in their order, at the cost of those alone.
+    pub fn severed_within(&self, nodes: Range<usize>) -> impl Iterator<Item = NodeId> + '_ {
+        self.injuries_within(nodes).filter(|(_, injury)| !injury.gaps().is_empty()).map(|(node, _)| node)
     }
 
     /// What is left of a severed segment, from parent to node; nothing of one that is whole, or wholly taken out.
@@ -190,8 +196,9 @@ pub fn write_stumps(
 
 /// Appends what is left of one segment; nothing if it is whole, wholly taken out, or not of the tree.
 ///
-/// A piece is drawn with the taper that the whole segment has. The round end of a cut stays within the piece, so that
-/// gaps are as wide as the ledger has them; a piece too short for it ends more bluntly.
+/// A piece is drawn with the taper that the whole segment has. An end with a lumen is
+/// [open](SegmentInstance::is_open), and ends flat. A sealed one is round; its round end stays within the piece, and one
+/// too short for it ends more bluntly. So gaps are as wide as the ledger has them.
 pub fn write_stumps_of(
     wounds: &Wounds,
     node: NodeId,
@@ -203,35 +210,53 @@ pub fn write_stumps_of(
     let (Some(injury), Some(ends)) = (wounds.injury(node), segment(tree, node)) else { return };
     let birth = birth_steps.get(node.index()).copied().unwrap_or(0);
     let whole = segment_instance(tree, node.index(), birth, colors);
-    let length = ends[0].distance(ends[1]);
-    out.extend(wounds.pieces(node).map(|piece| {
-        let is_cut = |share: f32| injury.gaps().iter().any(|gap: &Gap| gap.from == share || gap.to == share);
-        draw(&whole, ends, length, piece, [is_cut(piece.from), is_cut(piece.to)])
-    }));
+    out.extend(wounds.pieces(node).map(|piece| draw(&whole, ends, piece, tips(injury, piece))));
 }
 
-fn draw(
-    whole: &SegmentInstance,
-    [start, end]: [Vec3; 2],
-    length: f32,
-    piece: Piece,
-    cut: [bool; 2],
-) -> SegmentInstance {
+/// How a piece ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum PieceEnd {
+    /// In the segment's own node, or its parent's.
+    Node,
+    /// At a cut that was sealed.
+    Sealed,
+    /// At a cut, with its lumen open.
+    Open,
+}
+
+/// How a piece ends towards the parent, and towards the node.
+fn tips(injury: &Injury, piece: Piece) -> [PieceEnd; 2] {
+    let end = |gap: Option<&Gap>, tip: fn(&Gap) -> Option<Tip>| match gap.map(tip) {
+        None => PieceEnd::Node,
+        Some(Some(tip)) if !tip.sealed => PieceEnd::Open,
+        Some(_) => PieceEnd::Sealed,
+    };
+    let before = injury.gaps().iter().find(|gap| gap.to == piece.from);
+    let after = injury.gaps().iter().find(|gap| gap.from == piece.to);
+    [end(before, |gap| gap.distal), end(after, |gap| gap.proximal)]
+}
+
+fn draw(whole: &SegmentInstance, [start, end]: [Vec3; 2], piece: Piece, tips: [PieceEnd; 2]) -> SegmentInstance {
+    let length = start.distance(end);
     let radius = |share: f32| whole.start_radius + (whole.end_radius - whole.start_radius) * share;
     let room = MOST_DOME * length * (piece.to - piece.from);
     let domes = [
-        if cut[0] { START_DOME * radius(piece.from) } else { 0.0 },
-        if cut[1] { END_DOME * radius(piece.to) } else { 0.0 },
+        if tips[0] == PieceEnd::Sealed { START_DOME * radius(piece.from) } else { 0.0 },
+        if tips[1] == PieceEnd::Sealed { END_DOME * radius(piece.to) } else { 0.0 },
     ];
     // How much of their size the round ends have room for.
     let fit = (room / (domes[0] + domes[1]).max(f32::MIN_POSITIVE)).min(1.0);
     let [back, ahead] = domes.map(|dome| fit * dome / length);
-    let size = |is_cut: bool, share: f32| radius(share) * if is_cut { fit } else { 1.0 };
+    let size = |tip: PieceEnd, share: f32| match tip {
+        PieceEnd::Node => radius(share),
+        PieceEnd::Sealed => fit * radius(share),
+        PieceEnd::Open => -radius(share),
+    };
     SegmentInstance {
         start: start.lerp(end, piece.from + back).to_array(),
-        start_radius: size(cut[0], piece.from),
+        start_radius: size(tips[0], piece.from),
         end: start.lerp(end, piece.to - ahead).to_array(),
-        end_radius: size(cut[1], piece.to),
+        end_radius: size(tips[1], piece.to),
         ..*whole
     }
 }

@@ -7,7 +7,7 @@ use super::{Blade, BladeError, ClampId, EndId, Retraction, SeveredEnd, WoundErro
 use crate::synthesis::haemodynamics::EndSide;
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
 use bevy_math::Vec3;
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::Range};
 
 /// All that was done to one tree.
 ///
@@ -255,6 +255,13 @@ impl Wounds {
 
     pub(super) fn injuries(&self) -> impl Iterator<Item = (NodeId, &Injury)> {
         self.injuries.iter().map(|(&node, injury)| (NodeId(node), injury))
+    }
+
+    pub(super) fn injuries_within(&self, nodes: Range<usize>) -> impl Iterator<Item = (NodeId, &Injury)> {
+        let bound = |node: usize| u32::try_from(node).unwrap_or(u32::MAX);
+        // An empty range may lie anywhere: a map takes none that is the wrong way round.
+        let nodes = bound(nodes.start)..bound(nodes.end.max(nodes.start));
+        self.injuries.range(nodes).map(|(&node, injury)| (NodeId(node), injury))
     }
 
     pub(super) fn end_id(&self, index: u32) -> EndId {

@@ -1,0 +1,194 @@
+//! What is left of cut vessels: more pieces than their segments have slots.
+//!
+//! In: the [`Wounds`] of a tree and the nodes whose segments changed. Out: the segments that are drawn instead.
+//!
+//! Growth's rule stands: slot `i` of the buffer belongs to node `i`. A severed segment shows its first piece there. Its
+//! further pieces have slots behind those of all nodes, in chunks of their own, with their own boxes. A cut, like its
+//! undoing, writes the slots of its segments and no others.
+
+use super::{
+    detail::FEWEST_SLOTS,
+    segments::{ChunkContents, SegmentBuffer, SegmentStore},
+    upload::SegmentWrite,
+};
+use crate::{
+    plugin::Vessels,
+    synthesis::{
+        instances::{SegmentColors, SegmentInstance},
+        tree::NodeId,
+        wound::{Wounds, write_stumps_of},
+    },
+};
+use bevy::{math::bounding::BoundingVolume, prelude::*};
+use std::{collections::BTreeMap, ops::Range};
+
+/// The severed segments of one vessel entity, as they are drawn.
+#[derive(Debug, Default)]
+pub(super) struct Stumps {
+    /// By node.
+    severed: BTreeMap<u32, Severed>,
+    /// The further pieces, by their slots behind those of the nodes.
+    slots: Vec<SegmentInstance>,
+    /// Slots that are free, each hidden.
+    free: Vec<u32>,
+    /// Slots that are not on the GPU yet; some more than once.
+    changed: Vec<u32>,
+    /// Where the slots begin in the buffer, as it was written last.
+    first: usize,
+    /// Chunk entities, in the order of the slots.
+    chunks: Vec<Entity>,
+}
+
+/// One severed segment.
+#[derive(Debug)]
+struct Severed {
+    /// What its own slot shows.
+    own: SegmentInstance,
+    /// Slots of its further pieces.
+    further: Vec<u32>,
+}
+
+impl Stumps {
+    /// The entities that draw.
+    pub(super) fn chunks(&self) -> &[Entity] {
+        &self.chunks
+    }
+
+    /// Slots that the buffer has to have room for, whole chunks. There is always room for the first cuts.
+    pub(super) fn room(&self) -> usize {
+        self.slots.len().next_power_of_two().max(FEWEST_SLOTS)
+    }
+
+    /// Takes in what became of the segments in ranges of nodes, and forgets those of nodes from `len` on.
+    pub(super) fn update(
+        &mut self,
+        wounds: Option<&Wounds>,
+        vessels: &Vessels,
+        colors: &SegmentColors,
+        changed: impl Iterator<Item = Range<usize>>,
+        len: usize,
+    ) {
+        let mut pieces = Vec::new();
+        for nodes in changed.chain([len..u32::MAX as usize]) {
+            let known = self.severed.range(nodes.start as u32..nodes.end as u32).map(|(&node, _)| NodeId(node));
+            let healed = known.filter(|&node| node.index() >= len || wounds.is_none_or(|all| !all.is_severed(node)));
+            for node in healed.collect::<Vec<_>>() {
+                self.remove(node);
+            }
+            let Some(wounds) = wounds else { continue };
+            for node in wounds.severed_within(nodes).take_while(|node| node.index() < len) {
+                pieces.clear();
+                write_stumps_of(wounds, node, vessels.tree(), vessels.birth_steps(), colors, &mut pieces);
+                self.insert(node, &pieces);
+            }
+        }
+    }
+
+    fn insert(&mut self, node: NodeId, pieces: &[SegmentInstance]) {
+        let (own, further) =
+            pieces.split_first().map_or((SegmentInstance::HIDDEN, &[][..]), |(own, rest)| (*own, rest));
+        let mut slots = self.severed.remove(&node.0).map_or_else(Vec::new, |severed| severed.further);
+        while slots.len() > further.len() {
+            slots.pop().into_iter().for_each(|slot| self.release(slot));
+        }
+        while slots.len() < further.len() {
+            slots.push(self.claim());
+        }
+        for (&slot, piece) in slots.iter().zip(further) {
+            self.write(slot, *piece);
+        }
+        self.severed.insert(node.0, Severed { own, further: slots });
+    }
+
+    fn remove(&mut self, node: NodeId) {
+        for slot in self.severed.remove(&node.0).into_iter().flat_map(|severed| severed.further) {
+            self.release(slot);
+        }
+    }
+
+    fn claim(&mut self) -> u32 {
+        self.free.pop().unwrap_or_else(|| {
+            let slot = self.slots.len() as u32;
+            self.slots.push(SegmentInstance::HIDDEN);
+            self.changed.push(slot);
+            slot
+        })
+    }
+
+    fn release(&mut self, slot: u32) {
+        self.write(slot, SegmentInstance::HIDDEN);
+        self.free.push(slot);
+    }
+
+    fn write(&mut self, slot: u32, segment: SegmentInstance) {
+        let current = &mut self.slots[slot as usize];
+        if *current != segment {
+            *current = segment;
+            self.changed.push(slot);
+        }
+    }
+
+    /// Puts the first pieces in place of the segments in `out`, which are those of `nodes`.
+    pub(super) fn replace(&self, nodes: Range<usize>, out: &mut [SegmentInstance]) {
+        for (&node, severed) in self.severed.range(nodes.start as u32..nodes.end as u32) {
+            out[node as usize - nodes.start] = severed.own;
+        }
+    }
+
+    /// Runs of slots to be written, rising, and then no longer changed.
+    fn take_changed(&mut self) -> Vec<Range<usize>> {
+        let mut changed = std::mem::take(&mut self.changed);
+        changed.sort_unstable();
+        changed.dedup();
+        changed.chunk_by(|a, b| a + 1 == *b).map(|run| run[0] as usize..run[run.len() - 1] as usize + 1).collect()
+    }
+}
+
+impl SegmentStore<'_, '_> {
+    /// Lets the stumps begin behind the nodes' slots, of which the buffer may have another number now. What they leave behind
+    /// becomes slots of nodes, or was, and is hidden.
+    pub(super) fn move_stumps(&mut self, segments: &mut SegmentBuffer) {
+        let first = segments.capacity();
+        let stumps = &mut segments.stumps;
+        if stumps.first == first {
+            return;
+        }
+        let whole_chunks = stumps.slots.len().next_multiple_of(FEWEST_SLOTS);
+        for first in [stumps.first, first].into_iter().filter(|_| whole_chunks > 0) {
+            let mut hidden = SegmentWrite::new(segments.buffer.clone());
+            hidden.extend(first..first + whole_chunks);
+            self.writes.push(hidden);
+        }
+        stumps.first = first;
+        stumps.changed.extend(0..stumps.slots.len() as u32);
+        for chunk in stumps.chunks.drain(..) {
+            self.commands.entity(chunk).try_despawn();
+        }
+    }
+
+    /// Queues the stumps that changed, and fits the boxes of their chunks.
+    pub(super) fn write_stumps(&mut self, entity: Entity, segments: &mut SegmentBuffer) {
+        let first = segments.stumps.first;
+        let changed = segments.stumps.take_changed();
+        let mut write = SegmentWrite::new(segments.buffer.clone());
+        for run in &changed {
+            let out = write.extend(first + run.start..first + run.end);
+            out.copy_from_slice(&segments.stumps.slots[run.clone()]);
+        }
+        self.writes.push(write);
+        let mut chunks: Vec<usize> =
+            changed.iter().flat_map(|run| run.start / FEWEST_SLOTS..run.end.div_ceil(FEWEST_SLOTS)).collect();
+        chunks.dedup();
+        for chunk in chunks {
+            let slots = segments.stumps.slots[chunk * FEWEST_SLOTS..].iter().take(FEWEST_SLOTS);
+            let visible: Vec<SegmentInstance> = slots.filter(|segment| segment.is_visible()).copied().collect();
+            let bounds = visible.iter().map(SegmentInstance::bounds).reduce(|a, b| a.merge(&b));
+            let mut contents = ChunkContents::default();
+            contents.add(bounds, &visible);
+            let known = segments.stumps.chunks.get(chunk).copied();
+            let at = first + chunk * FEWEST_SLOTS;
+            let spawned = self.fit_chunk((entity, segments), known, at, &contents, FEWEST_SLOTS);
+            segments.stumps.chunks.extend(spawned);
+        }
+    }
+}
