@@ -26,8 +26,9 @@ fn assert_gaps(sealed: bool, domes: [f32; 2]) {
         // Vessels from slender to thicker than long.
         let whole = straight(1);
         let positions = whole.positions().iter().map(|&at| at * long).collect();
-        let tree = VesselTree::from_arrays(positions, whole.parents().to_vec(), whole.radii().to_vec()).unwrap();
-        let mut wounds = Wounds::new(Retraction { radii, length: 0.0 }).unwrap();
+        let tree =
+            VesselTree::from_arrays(positions, whole.parents().to_vec(), whole.radii().to_vec()).expect("a tree");
+        let mut wounds = Wounds::new(Retraction { radii, length: 0.0 }).expect("a retraction");
         cut_at(&mut wounds, &tree, 0.6 * long);
         cut_at(&mut wounds, &tree, 0.3 * long);
         if sealed {
