@@ -113,10 +113,10 @@ impl Site {
         [touch.map_or(over, |(touch, _)| touch), -self.normal]
     }
 
-    fn view(&self) -> Viewpoint {
-        let eye = self.wound + 0.22 * (self.normal + 0.35 * self.across + 0.25 * Vec3::Y).normalize();
-        let up = if self.normal.y.abs() > 0.9 { Vec3::Z } else { Vec3::Y };
-        Viewpoint { eye, target: self.wound, up }
+    /// From nearby, on the line along which it is seen from the front: nothing is in the way there.
+    fn view(&self, surface: &Surface) -> Viewpoint {
+        let eye = self.wound + 0.25 * (surface.eye - self.wound).normalize_or(Vec3::Z);
+        Viewpoint { eye, target: self.wound, up: Vec3::Y }
     }
 }
 
@@ -166,7 +166,7 @@ fn operate(
     }
     if let Some(&(_, file)) = PICTURES.get(operation.pictures).filter(|(at, _)| *at <= now) {
         operation.pictures += 1;
-        shots.0.push(Shot { file, view: site.view(), field_of_view: 36.0, endoscope: false });
+        shots.0.push(Shot { file, view: site.view(&surface), field_of_view: 36.0, endoscope: false });
     }
     operation.is_over = now >= END;
     if operation.is_over {
