@@ -99,7 +99,7 @@ fn spawn_organ(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets)
     commands.insert_resource(Surface::new(&Mesh::from(colon.mesh.clone()), &place, moved(&colon.front, &place).eye)?);
     let tint = args.wish.tint(Color::WHITE);
     let outside = colon.mesh.part(colon.outer.clone()).into();
-    let vessels = args.wish.vessels(Some(&colon.roots), 1.4);
+    let vessels = args.wish.vessels(Some(&colon.roots), 0.7);
     assets.spawn(&mut commands, outside, tint, place).insert((Name::new("colon"), vessels, perfusion()));
     let inside = colon.mesh.part(colon.outer.end..colon.inner.end).into();
     assets.spawn(&mut commands, inside, tint, place).insert(Name::new("inside"));
@@ -110,7 +110,7 @@ fn spawn_organ(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets)
 fn spawn_loaded(loaded: On<OrganLoaded>, mut commands: Commands, args: Res<Args>, mut assets: OrganAssets) -> Result {
     commands.insert_resource(Surface::new(&loaded.mesh, &loaded.place, front_view().eye)?);
     let tint = args.wish.tint(Color::srgb(0.74, 0.42, 0.37));
-    let vessels = args.wish.vessels(None, 1.4);
+    let vessels = args.wish.vessels(None, 0.7);
     let organ = (Name::new("organ"), vessels, perfusion());
     assets.spawn(&mut commands, loaded.mesh.clone(), tint, loaded.place).insert(organ);
     Ok(())

@@ -36,6 +36,8 @@ const INTERVAL: f64 = 0.1;
 /// When the cut begins and ends, and how long it is in world units.
 const CUT: [f64; 2] = [0.3, 0.8];
 const CUT_LENGTH: f32 = 0.11;
+/// Least length of the segment that is cut, in radii.
+const SLENDER: f32 = 6.0;
 /// How far above the cut the clamp goes on, in world units.
 const CLAMP_ABOVE: f32 = 0.03;
 const CLAMP: f64 = 5.0;
@@ -83,7 +85,7 @@ struct Site {
 }
 
 impl Site {
-    /// The widest artery in view, with some vessel between it and its root.
+    /// The widest slender artery in view, with some vessel between it and its root.
     fn find(vessels: &Vessels, place: &GlobalTransform, surface: &Surface) -> Option<Self> {
         let tree = vessels.tree();
         let at = |node: NodeId| place.transform_point(tree.positions()[node.index()]);
@@ -92,7 +94,10 @@ impl Site {
             let mut path = std::iter::successors(Some(node), |&node| tree.parent(node));
             path.find(|&other| at(other).distance(at(node)) > far)
         };
-        let mut nodes: Vec<NodeId> = tree.segments().map(|(node, _)| NodeId(node as u32)).collect();
+        // an end stays on its segment: in a stout one, the joints' round ends would hide the gap
+        let is_slender = |node: usize| tree.segment_vector(node).length() > SLENDER * tree.radii()[node];
+        let slender = tree.segments().filter(|&(node, _)| is_slender(node));
+        let mut nodes: Vec<NodeId> = slender.map(|(node, _)| NodeId(node as u32)).collect();
         nodes.sort_by(|a, b| tree.radii()[b.index()].total_cmp(&tree.radii()[a.index()]));
         let node = nodes.into_iter().find(|&node| above(node, 2.0 * CLAMP_ABOVE).is_some() && is_seen(node))?;
         let (wound, normal) = surface.nearest(at(node))?;
@@ -108,10 +113,10 @@ impl Site {
         [touch.map_or(over, |(touch, _)| touch), -self.normal]
     }
 
-    fn view(&self) -> Viewpoint {
-        let eye = self.wound + 0.42 * (self.normal + 0.35 * self.across + 0.25 * Vec3::Y).normalize();
-        let up = if self.normal.y.abs() > 0.9 { Vec3::Z } else { Vec3::Y };
-        Viewpoint { eye, target: self.wound, up }
+    /// From nearby, on the line along which it is seen from the front: nothing is in the way there.
+    fn view(&self, surface: &Surface) -> Viewpoint {
+        let eye = self.wound + 0.25 * (surface.eye - self.wound).normalize_or(Vec3::Z);
+        Viewpoint { eye, target: self.wound, up: Vec3::Y }
     }
 }
 
@@ -124,7 +129,7 @@ fn operate(
     mut vessels: ResMut<CuttableVessels>,
     mut looks: Query<&mut VesselAppearance>,
     patient: (Query<(&CirculationState, &OrganSupply)>, Query<(&VesselSystem, &Vessels, &GlobalTransform)>),
-    (surface, dbg): (Option<Res<Surface>>, Query<(&GlobalTransform, &bevy_vessels::plugin::OpenEnd)>),
+    surface: Option<Res<Surface>>,
     mut exit: MessageWriter<AppExit>,
 ) -> Result {
     *step = TimeUpdateStrategy::ManualDuration(Duration::ZERO);
@@ -137,7 +142,6 @@ fn operate(
         // the blood flows and its supply is known: from here on, all is the same whatever the machine
         if patient.0.iter().any(|(state, supply)| state.flows() && !supply.vertices.is_empty()) {
             let arteries = patient.1.iter().filter(|(system, ..)| system.0 == System::Arterial);
-            eprintln!("site search");
             operation.site = arteries.filter_map(|(_, vessels, place)| Site::find(vessels, place, &surface)).next();
             more.expected = operation.site.is_some();
         }
@@ -162,26 +166,9 @@ fn operate(
     }
     if let Some(&(_, file)) = PICTURES.get(operation.pictures).filter(|(at, _)| *at <= now) {
         operation.pictures += 1;
-        shots.0.push(Shot { file, view: site.view(), field_of_view: 36.0, endoscope: false });
+        shots.0.push(Shot { file, view: site.view(&surface), field_of_view: 36.0, endoscope: false });
     }
     operation.is_over = now >= END;
-    if std::env::var("DBG").is_ok() {
-        if before == 0.0 {
-            eprintln!(
-                "site {:?} {:?} {:?} {:?} scalpel {:?}",
-                site.wound,
-                site.normal,
-                site.across,
-                site.upstream,
-                site.scalpel(0.5, &surface)
-            );
-        }
-        if is_due(1.0) {
-            for end in &dbg {
-                eprintln!("end {:?} r {}", end.0.translation(), end.1.radius);
-            }
-        }
-    }
     if operation.is_over {
         more.expected = false;
     } else if more.taken >= shots.0.len() {
