@@ -10,6 +10,7 @@ mod headless;
 
 mod detail;
 mod stage;
+mod wounds;
 
 use bevy::{
     core_pipeline::prepass::{DeferredPrepass, DepthPrepass, MotionVectorPrepass, NormalPrepass},
@@ -39,7 +40,12 @@ fn tree(nodes: &[([f32; 3], u32, f32)]) -> VesselTree {
 
 /// One horizontal segment through the middle of the picture, 40 pixels long and 8 to either side thick.
 fn bar() -> VesselTree {
-    tree(&[([-20.0, 0.0, 0.0], NO_PARENT, 8.0), ([20.0, 0.0, 0.0], 0, 8.0)])
+    bar_of(8.0, 20.0)
+}
+
+/// A horizontal segment of a radius through the middle of the picture, reaching as far as `half` to either side.
+fn bar_of(radius: f32, half: f32) -> VesselTree {
+    tree(&[([-half, 0.0, 0.0], NO_PARENT, radius), ([half, 0.0, 0.0], 0, radius)])
 }
 
 /// A comb of `count` short vertical vessels, each a tree of its own, from left to right.
