@@ -40,7 +40,7 @@ struct Args {
     /// Milliseconds that their growth may take in each frame, all together.
     #[arg(long, default_value_t = 2.0)]
     budget: f32,
-    /// Factor for the lengths of the paper's settings: the smaller, the more nodes. By default about 6,500.
+    /// Factor for the lengths of the paper's settings: the smaller, the more nodes. By default about 6,000.
     #[arg(long, default_value_t = 0.75)]
     lengths: f32,
 }
