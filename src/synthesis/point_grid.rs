@@ -304,6 +304,13 @@ impl PointGrid {
         found
     }
 
+    /// Whether a point in the centre's own cell lies within `radius`: the quickest question, and mostly enough in space
+    /// that is filled.
+    #[inline]
+    pub fn any_beside(&self, center: Vec3, radius: f32) -> bool {
+        self.chain_reaches(self.head(self.cell_of(center)), center, radius * radius)
+    }
+
     #[inline]
     fn chain_reaches(&self, head: u32, center: Vec3, limit: f32) -> bool {
         let mut id = head;

@@ -124,8 +124,13 @@ impl SystemGrowth {
     /// Whether a candidate cannot become a drain: it lies in supplied tissue, within the birth distance of a node, or too
     /// near a drain.
     pub fn refuses(&self, candidate: Vec3) -> bool {
-        self.drains.index().any_within(candidate, self.lengths.drain_birth)
-            || self.forest.index().any_within(candidate, self.lengths.node_birth)
+        let (nodes, drains) = (self.forest.index(), self.drains.index());
+        let Lengths { node_birth, drain_birth, .. } = self.lengths;
+        // What is quickly asked first.
+        drains.any_beside(candidate, drain_birth)
+            || nodes.any_beside(candidate, node_birth)
+            || drains.any_within(candidate, drain_birth)
+            || nodes.any_within(candidate, node_birth)
     }
 
     /// Lets a candidate that has not been refused become a drain, unless one has been born too near it meanwhile.
