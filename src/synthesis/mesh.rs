@@ -17,6 +17,12 @@ use bevy_math::{
 /// Largest absolute coordinate of a vertex, in tissue lengths. Squares of areas stay finite below it.
 pub const MAX_COORDINATE: f32 = 1.0e9;
 
+/// Whether all coordinates are finite and within [`MAX_COORDINATE`].
+pub(crate) fn is_usable(position: Vec3) -> bool {
+    // The greatest of NaN and a number may be the number, so both are asked.
+    position.is_finite() && position.abs().max_element() <= MAX_COORDINATE
+}
+
 /// Most triangles of a mesh, and most vertices.
 pub const MAX_TRIANGLES: usize = 1 << 26;
 
@@ -111,9 +117,7 @@ impl TriangleMesh {
         if vertices < 3 || count == 0 {
             return Err(MeshError::Empty { vertices, triangles: count });
         }
-        // Written so that NaN fails it too.
-        let usable = |p: &Vec3| p.abs().max_element() <= MAX_COORDINATE && p.is_finite();
-        if let Some(vertex) = positions.iter().position(|p| !usable(p)) {
+        if let Some(vertex) = positions.iter().position(|&position| !is_usable(position)) {
             return Err(MeshError::BadPosition { vertex, position: positions[vertex] });
         }
         for (triangle, corners) in triangles.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use super::map_all;
 use crate::synthesis::{
-    mesh::{MAX_COORDINATE, MAX_TRIANGLES},
+    mesh::{MAX_COORDINATE, MAX_TRIANGLES, is_usable},
     tissue::{
         bvh::{Bounds, BoxTree},
         triangle::closest_on_triangle,
@@ -77,9 +77,7 @@ impl TetMesh {
                 return Err(TetMeshError::TooLarge { what, count });
             }
         }
-        // Written so that NaN fails it too.
-        let usable = |p: &Vec3| p.abs().max_element() <= MAX_COORDINATE && p.is_finite();
-        if let Some(vertex) = positions.iter().position(|p| !usable(p)) {
+        if let Some(vertex) = positions.iter().position(|&position| !is_usable(position)) {
             return Err(TetMeshError::BadPosition { vertex, position: positions[vertex] });
         }
         for (tetrahedron, corners) in tetrahedra.iter().enumerate() {

@@ -13,7 +13,7 @@ pub use error::RootError;
 
 use crate::synthesis::{
     colonization::{ColonizationSettings, SystemSettings},
-    mesh::MAX_COORDINATE,
+    mesh::is_usable,
     rng::Stream,
     tissue::{Tissue, TissuePoint},
     tree::{System, VesselTree},
@@ -193,11 +193,6 @@ fn check_finite(system: System, points: &[Vec3]) -> Result<(), RootError> {
         Some(&position) => Err(RootError::NotFinite { system, position }),
         None => Ok(()),
     }
-}
-
-fn is_usable(position: Vec3) -> bool {
-    // The greatest of NaN and a number may be the number, so both are asked.
-    position.is_finite() && position.abs().max_element() <= MAX_COORDINATE
 }
 
 /// Refuses roots at the same place, in one system or in both.
