@@ -50,6 +50,7 @@
 //! ```
 
 mod alias;
+mod spatial_order;
 mod attraction;
 pub mod binding;
 pub mod colonization;

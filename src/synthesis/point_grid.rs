@@ -1,15 +1,17 @@
 //! An index over points that come, go and are asked for while vessels grow.
 //!
-//! A uniform grid in two levels: a table of bricks of 4×4×4 cells, of which only those with points exist, so a surface in a
-//! large box costs little memory. Each brick knows its filled cells as the bits of one word: a question looks at those of
-//! them that its box meets, and empty space costs next to nothing. A cell is a chain through `next`, so adding a point
-//! allocates nothing once the arrays have room.
+//! A uniform grid in three levels. A table of bricks of 4×4×4 cells, of which only those with points exist, so a surface in
+//! a large box costs little memory. Each brick knows its filled cells as the bits of one word: a question looks at those of
+//! them that its box meets, and empty space costs next to nothing. And a cell is a chain of blocks, each of them one cache
+//! line with up to four points, whose distances are found at once. Adding a point allocates nothing once the arrays have
+//! room.
 //!
 //! Why not kiddo here: its mutable tree refuses more than 32 points that share a coordinate, as all of a disc at z = 0
 //! do, and points cannot be removed from its immutable one. It serves where a point set is static (coverage of a
 //! finished tree).
 
-use bevy_math::{UVec3, Vec3, Vec3A, bounding::Aabb3d};
+use crate::synthesis::spatial_order::SpatialOrder;
+use bevy_math::{UVec3, Vec3, Vec3A, Vec4, bounding::Aabb3d};
 
 /// Cells along each side of a brick.
 const SIDE: u32 = 4;
@@ -17,8 +19,15 @@ const SIDE: u32 = 4;
 const CELLS: usize = (SIDE * SIDE * SIDE) as usize;
 /// Most bricks in the table: 16 MiB. Coarser cells keep larger spaces below it, at the cost of speed alone.
 const MAX_BRICKS: f64 = (1u32 << 22) as f64;
-/// End of a chain, and the brick that is not there.
+/// Points in a block.
+const LANES: usize = 4;
+/// The id of no point.
 const NONE: u32 = u32::MAX;
+/// The brick without points, which stands in the table where there is no other, and the block without points, which ends
+/// every chain. With them a question needs not ask whether there is something to look at.
+const EMPTY: u32 = 0;
+/// Questions that are asked at once.
+const BATCH: usize = 32;
 
 /// Points with dense ids in a box, found by distance.
 ///
@@ -39,27 +48,69 @@ pub struct PointGrid {
     layer: u32,
     table: Vec<u32>,
     bricks: Vec<Brick>,
-    entries: Vec<Entry>,
+    blocks: Vec<Block>,
+    /// The block that follows each one in its cell, or among those that are free.
+    next: Vec<u32>,
+    /// First of the blocks that are free.
+    free: u32,
+    /// Points by id; [`REMOVED`] for those that are not there.
+    points: Vec<Vec3>,
+    laid: usize,
 }
 
-/// 4×4×4 cells: which of them hold points, and the first point of each of these.
+/// 4×4×4 cells: which of them hold points, and the first block of each of these.
 #[derive(Clone, Debug)]
 struct Brick {
     filled: u64,
     heads: [u32; CELLS],
 }
 
-/// A point and the next one in its cell: together, so that a step along a chain is one load.
+/// Up to four points of a cell. All blocks of a cell but the first are full, and points come before empty lanes.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
-    point: Vec3,
-    next: u32,
+#[repr(C, align(64))]
+struct Block {
+    x: Vec4,
+    y: Vec4,
+    z: Vec4,
+    ids: [u32; LANES],
+}
+
+/// What stands for a removed point. No distance to it passes a comparison.
+const REMOVED: Vec3 = Vec3::NAN;
+
+impl Block {
+    const EMPTY: Self = Self { x: Vec4::NAN, y: Vec4::NAN, z: Vec4::NAN, ids: [NONE; LANES] };
+
+    fn set(&mut self, lane: usize, id: u32, point: Vec3) {
+        (self.x[lane], self.y[lane], self.z[lane]) = (point.x, point.y, point.z);
+        self.ids[lane] = id;
+    }
+
+    fn point(&self, lane: usize) -> Vec3 {
+        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
+    }
+
+    /// Number of points.
+    fn len(&self) -> usize {
+        self.ids.iter().take_while(|&&id| id != NONE).count()
+    }
+
+    /// Squared distances of all lanes, no number for empty ones.
+    #[inline]
+    fn distances(&self, center: Vec3) -> Vec4 {
+        let (x, y, z) = (self.x - center.x, self.y - center.y, self.z - center.z);
+        x * x + y * y + z * z
+    }
+}
+
+impl Brick {
+    const EMPTY: Self = Self { filled: 0, heads: [EMPTY; CELLS] };
 }
 
 impl PointGrid {
     /// An empty grid over a box. Cells have at least the side `cell`; more where the box would need too many.
     ///
-    /// A cell as large as the distances asked for is a good choice.
+    /// A cell twice as large as the distances asked for is a good choice.
     pub fn new(bounds: &Aabb3d, cell: f32) -> Self {
         let mut grid = Self::default();
         grid.reset(bounds, cell);
@@ -68,19 +119,29 @@ impl PointGrid {
 
     /// Removes all points and lays the grid anew, keeping its memory.
     pub fn reset(&mut self, bounds: &Aabb3d, cell: f32) {
-        self.entries.clear();
+        self.points.clear();
+        self.laid = 0;
         self.lay(bounds.min, bounds.max, cell);
     }
 
-    /// Lays the grid anew with cells of another size; the points stay.
+    /// Lays the grid anew with cells of another size; the points stay. Those that are near in space are near in memory from
+    /// then on.
     pub fn resize_cells(&mut self, cell: f32) {
         let max = self.origin + self.cells.as_vec3a() * self.cell;
         self.lay(self.origin, max, cell);
-        for id in 0..self.entries.len() {
-            if self.entries[id].next != REMOVED {
-                self.link(id as u32);
+        let mut order = SpatialOrder::default();
+        order.sort(&Aabb3d { min: self.origin, max }, &self.points);
+        for &id in order.indices() {
+            if !self.points[id as usize].is_nan() {
+                self.link(id);
             }
         }
+        self.laid = self.points.len();
+    }
+
+    /// Whether most points came since the grid was laid.
+    pub fn is_untidy(&self) -> bool {
+        self.points.len() > 20_000 && self.points.len() > self.laid * 3 / 2
     }
 
     fn lay(&mut self, min: Vec3A, max: Vec3A, cell: f32) {
@@ -105,8 +166,14 @@ impl PointGrid {
         self.row = sides.x;
         self.layer = sides.x * sides.y;
         self.table.clear();
-        self.table.resize((self.layer * sides.z) as usize, NONE);
+        self.table.resize((self.layer * sides.z) as usize, EMPTY);
         self.bricks.clear();
+        self.bricks.push(Brick::EMPTY);
+        self.blocks.clear();
+        self.blocks.push(Block::EMPTY);
+        self.next.clear();
+        self.next.push(EMPTY);
+        self.free = EMPTY;
     }
 
     /// Side of a cell.
@@ -116,65 +183,88 @@ impl PointGrid {
 
     /// Number of ids given out, removed points included.
     pub fn len(&self) -> usize {
-        self.entries.len()
+        self.points.len()
     }
 
     /// Whether no id has been given out.
     pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
+        self.points.is_empty()
     }
 
     /// The point of an id.
     pub fn point(&self, id: u32) -> Vec3 {
-        self.entries[id as usize].point
+        self.points[id as usize]
     }
 
     /// Adds a point; its id is the number of ids before it.
     pub fn push(&mut self, point: Vec3) -> u32 {
-        let id = self.entries.len() as u32;
-        self.entries.push(Entry { point, next: NONE });
+        let id = self.points.len() as u32;
+        self.points.push(point);
         self.link(id);
         id
     }
 
     /// Puts a new point at the id of a removed one.
     pub fn replace(&mut self, id: u32, point: Vec3) {
-        debug_assert_eq!(self.entries[id as usize].next, REMOVED);
-        self.entries[id as usize].point = point;
+        debug_assert!(self.points[id as usize].is_nan());
+        self.points[id as usize] = point;
         self.link(id);
     }
 
     /// Removes a point. Its id may be used again by [`replace`](Self::replace).
     pub fn remove(&mut self, id: u32) {
-        let Entry { point, next: after } = self.entries[id as usize];
+        let point = std::mem::replace(&mut self.points[id as usize], REMOVED);
         let (place, cell) = self.locate(self.cell_of(point));
         let brick = &mut self.bricks[self.table[place] as usize];
-        let head = &mut brick.heads[cell];
-        if *head == id {
-            *head = after;
-            if after == NONE {
+        let head = brick.heads[cell];
+        // The last point of the cell's first block takes the place of the one that leaves.
+        let last = self.blocks[head as usize].len() - 1;
+        let (moved, at) = (self.blocks[head as usize].ids[last], self.blocks[head as usize].point(last));
+        let mut block = head;
+        let lane = loop {
+            match self.blocks[block as usize].ids.iter().position(|&other| other == id) {
+                Some(lane) => break lane,
+                None => block = self.next[block as usize],
+            }
+        };
+        self.blocks[block as usize].set(lane, moved, at);
+        self.blocks[head as usize].set(last, NONE, REMOVED);
+        if last == 0 {
+            let after = std::mem::replace(&mut self.next[head as usize], self.free);
+            self.free = head;
+            brick.heads[cell] = after;
+            if after == EMPTY {
                 brick.filled &= !(1 << cell);
             }
-        } else {
-            let mut before = *head;
-            while self.entries[before as usize].next != id {
-                before = self.entries[before as usize].next;
-            }
-            self.entries[before as usize].next = after;
         }
-        self.entries[id as usize].next = REMOVED;
     }
 
     fn link(&mut self, id: u32) {
-        let (place, cell) = self.locate(self.cell_of(self.entries[id as usize].point));
+        let point = self.points[id as usize];
+        let (place, cell) = self.locate(self.cell_of(point));
         let brick = &mut self.table[place];
-        if *brick == NONE {
+        if *brick == EMPTY {
             *brick = self.bricks.len() as u32;
-            self.bricks.push(Brick { filled: 0, heads: [NONE; CELLS] });
+            self.bricks.push(Brick::EMPTY);
         }
         let brick = &mut self.bricks[*brick as usize];
         brick.filled |= 1 << cell;
-        self.entries[id as usize].next = std::mem::replace(&mut brick.heads[cell], id);
+        let head = &mut brick.heads[cell];
+        let used = if *head == EMPTY { LANES } else { self.blocks[*head as usize].len() };
+        if used < LANES {
+            self.blocks[*head as usize].set(used, id, point);
+            return;
+        }
+        let after = *head;
+        if self.free == EMPTY {
+            *head = self.blocks.len() as u32;
+            self.blocks.push(Block::EMPTY);
+            self.next.push(after);
+        } else {
+            *head = self.free;
+            self.free = std::mem::replace(&mut self.next[*head as usize], after);
+        }
+        self.blocks[*head as usize].set(0, id, point);
     }
 
     /// Where a point lies, in cells.
@@ -217,17 +307,14 @@ impl PointGrid {
         )
     }
 
-    /// First point of a cell's chain.
+    /// First block of a cell.
     #[inline]
     fn head(&self, cell: UVec3) -> u32 {
         let (place, inner) = self.locate(cell);
-        match self.table[place] {
-            NONE => NONE,
-            brick => self.bricks[brick as usize].heads[inner],
-        }
+        self.bricks[self.table[place] as usize].heads[inner]
     }
 
-    /// Calls `visit(first point)` for the filled cells of a box of cells, until it answers false.
+    /// Calls `visit(first block)` for the filled cells of a box of cells, until it answers false.
     #[inline]
     fn for_cells(&self, low: UVec3, high: UVec3, mut visit: impl FnMut(u32) -> bool) {
         let (first, last) = (low / SIDE, high / SIDE);
@@ -238,9 +325,6 @@ impl PointGrid {
                 let place = (y * self.row + z * self.layer) as usize;
                 for x in first.x..=last.x {
                     let brick = self.table[place + x as usize];
-                    if brick == NONE {
-                        continue;
-                    }
                     let brick = &self.bricks[brick as usize];
                     let mut cells = brick.filled & rows & COLUMNS[range(low.x, high.x, x)];
                     while cells != 0 {
@@ -258,7 +342,7 @@ impl PointGrid {
     /// radius from there on. The centre's own cell comes first, the others in no particular order.
     #[inline]
     fn scan(&self, center: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> f32) {
-        if self.entries.is_empty() {
+        if self.points.is_empty() {
             return;
         }
         let mut limit = radius * radius;
@@ -276,14 +360,19 @@ impl PointGrid {
 
     #[inline]
     fn scan_chain(&self, head: u32, center: Vec3, limit: &mut f32, visit: &mut impl FnMut(u32, f32) -> f32) {
-        let mut id = head;
-        while id != NONE {
-            let entry = &self.entries[id as usize];
-            let distance = entry.point.distance_squared(center);
-            if distance <= *limit {
-                *limit = visit(id, distance);
+        let mut next = head;
+        while next != EMPTY {
+            let block = &self.blocks[next as usize];
+            let distances = block.distances(center);
+            let mut near = distances.cmple(Vec4::splat(*limit)).bitmask();
+            while near != 0 {
+                let lane = near.trailing_zeros() as usize;
+                if distances[lane] <= *limit {
+                    *limit = visit(block.ids[lane], distances[lane]);
+                }
+                near &= near - 1;
             }
-            id = entry.next;
+            next = self.next[next as usize];
         }
     }
 
@@ -304,22 +393,32 @@ impl PointGrid {
         found
     }
 
-    /// Whether a point in the centre's own cell lies within `radius`: the quickest question, and mostly enough in space
-    /// that is filled.
-    #[inline]
-    pub fn any_beside(&self, center: Vec3, radius: f32) -> bool {
-        self.chain_reaches(self.head(self.cell_of(center)), center, radius * radius)
+    /// Marks those centres that have a point within `radius` in the first block of their own cell: the quickest question,
+    /// and mostly enough in space that is filled. The others stay as they are.
+    ///
+    /// Questions are asked a step at a time for many centres, so that the processor waits for the memory of all of them at
+    /// once.
+    pub fn mark_beside(&self, centers: &[Vec3], radius: f32, marks: &mut [bool]) {
+        let limit = Vec4::splat(radius * radius);
+        let mut heads = [EMPTY; BATCH];
+        for (centers, marks) in centers.chunks(BATCH).zip(marks.chunks_mut(BATCH)) {
+            for (head, &center) in heads.iter_mut().zip(centers) {
+                *head = self.head(self.cell_of(center));
+            }
+            for ((&head, &center), mark) in heads.iter().zip(centers).zip(marks) {
+                *mark |= self.blocks[head as usize].distances(center).cmple(limit).any();
+            }
+        }
     }
 
     #[inline]
     fn chain_reaches(&self, head: u32, center: Vec3, limit: f32) -> bool {
-        let mut id = head;
-        while id != NONE {
-            let entry = &self.entries[id as usize];
-            if entry.point.distance_squared(center) <= limit {
+        let mut next = head;
+        while next != EMPTY {
+            if self.blocks[next as usize].distances(center).cmple(Vec4::splat(limit)).any() {
                 return true;
             }
-            id = entry.next;
+            next = self.next[next as usize];
         }
         false
     }
@@ -365,8 +464,6 @@ impl PointGrid {
 
 /// From here on to its double every number is an integer.
 const INTEGERS: f32 = (1 << 23) as f32;
-/// What `next` holds for a removed point.
-const REMOVED: u32 = u32::MAX - 1;
 
 /// The cells of a brick that lie in a range along x, y or z, by the range's [number](range).
 const COLUMNS: [u64; 16] = cells_in_ranges(1);

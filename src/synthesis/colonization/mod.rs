@@ -208,14 +208,16 @@ impl Growth {
         let (tissue, settings) = (self.tissue.as_ref(), &self.settings);
         let (candidates, vacancy) = (&mut self.candidates, &mut self.vacancy);
         let ([arteries, veins], handed, links) = (&mut self.systems, &mut self.handed, &mut self.links);
-        for step in first..=last.saturating_add(1) {
-            parallel::join(
-                || step <= last && grow_arteries(arteries, candidates, vacancy, tissue, settings, step).0 > 0,
-                || step > first && grow_veins(veins, handed, links, tissue, settings, step - 1).new_nodes > 0,
-            );
-            handed.clear();
-            handed.extend_from_slice(arteries.supplied());
-        }
+        parallel::among_threads(|| {
+            for step in first..=last.saturating_add(1) {
+                parallel::join(
+                    || step <= last && grow_arteries(arteries, candidates, vacancy, tissue, settings, step).0 > 0,
+                    || step > first && grow_veins(veins, handed, links, tissue, settings, step - 1).new_nodes > 0,
+                );
+                handed.clear();
+                handed.extend_from_slice(arteries.supplied());
+            }
+        });
         self.step = last;
         self.settle();
     }
@@ -323,7 +325,7 @@ fn grow_arteries(
     if tissue.stage(1).is_none() {
         vacancy.prepare(tissue, arteries.length_scale(), arteries.forest.tree.positions(), arteries.drains.living());
     }
-    candidates.draw(ground.tissue, vacancy, step, settings.samples, |candidate| arteries.refuses(candidate));
+    candidates.draw(ground.tissue, vacancy, step, settings.samples, |candidates, refused| arteries.refuse(candidates, refused));
     let mut born = 0;
     for candidate in candidates.iter() {
         if let Some(drain) = arteries.offer_drain(candidate) {

@@ -15,6 +15,16 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + S
     items.iter_mut().enumerate().for_each(|(index, item)| act(index, item));
 }
 
+/// Does something on one of the threads that share work, where there are any: what is shared on the way is then handed from
+/// one to the other, and nobody has to be woken for it each time.
+pub(crate) fn among_threads<R: Send>(act: impl FnOnce() -> R + Send) -> R {
+    #[cfg(feature = "parallel")]
+    if rayon::current_num_threads() > 1 {
+        return rayon::scope(|_| act());
+    }
+    act()
+}
+
 /// Does two things, at once where there are threads.
 pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     #[cfg(feature = "parallel")]
@@ -46,4 +56,16 @@ where
     for (output, input) in outputs.iter_mut().zip(inputs) {
         *output = map(input);
     }
+}
+
+/// Lets `act` fill what belongs to each of the inputs, chunk by chunk.
+pub(crate) fn zip_chunks<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], act: impl Fn(&[I], &mut [O]) + Sync) {
+    #[cfg(feature = "parallel")]
+    if inputs.len() >= WORTH_SHARING && rayon::current_num_threads() > 1 {
+        use rayon::prelude::*;
+        let share = inputs.len().div_ceil(4 * rayon::current_num_threads()).max(256);
+        inputs.par_chunks(share).zip(outputs.par_chunks_mut(share)).for_each(|(inputs, outputs)| act(inputs, outputs));
+        return;
+    }
+    act(inputs, outputs);
 }

@@ -121,16 +121,17 @@ impl SystemGrowth {
         self.forest.settle();
     }
 
-    /// Whether a candidate cannot become a drain: it lies in supplied tissue, within the birth distance of a node, or too
-    /// near a drain.
-    pub fn refuses(&self, candidate: Vec3) -> bool {
+    /// Marks candidates that cannot become drains: those in supplied tissue, within the birth distance of a node, or too near
+    /// a drain.
+    pub fn refuse(&self, candidates: &[Vec3], refused: &mut [bool]) {
         let (nodes, drains) = (self.forest.index(), self.drains.index());
         let Lengths { node_birth, drain_birth, .. } = self.lengths;
         // What is quickly asked first.
-        drains.any_beside(candidate, drain_birth)
-            || nodes.any_beside(candidate, node_birth)
-            || drains.any_within(candidate, drain_birth)
-            || nodes.any_within(candidate, node_birth)
+        drains.mark_beside(candidates, drain_birth, refused);
+        nodes.mark_beside(candidates, node_birth, refused);
+        for (&candidate, refused) in candidates.iter().zip(refused).filter(|(_, refused)| !**refused) {
+            *refused = drains.any_within(candidate, drain_birth) || nodes.any_within(candidate, node_birth);
+        }
     }
 
     /// Lets a candidate that has not been refused become a drain, unless one has been born too near it meanwhile.
@@ -244,10 +245,10 @@ impl SystemGrowth {
         if self.lengths.reach() > before {
             self.drains.wake_all();
         }
-        if !FITTING_CELLS.contains(&(self.lengths.node_cell() / self.forest.index().cell())) {
+        if !FITTING_CELLS.contains(&(self.lengths.node_cell() / self.forest.index().cell())) || self.forest.index().is_untidy() {
             self.forest.resize_cells(self.lengths.node_cell());
         }
-        if !FITTING_CELLS.contains(&(self.lengths.drain_cell() / self.drains.cell())) {
+        if !FITTING_CELLS.contains(&(self.lengths.drain_cell() / self.drains.cell())) || self.drains.index().is_untidy() {
             self.drains.resize_cells(self.lengths.drain_cell());
         }
     }
