@@ -66,6 +66,51 @@ pub(crate) struct Found {
     pub cos: f32,
 }
 
+/// A new node that a drain has to know of.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Heard {
+    pub node: u32,
+    pub drain: u32,
+    /// Squared distance between them.
+    pub distance: f32,
+}
+
+/// Which drains hear of new nodes. Keeps its buffers.
+#[derive(Debug, Default)]
+pub(crate) struct News {
+    /// What is heard, by share of the nodes.
+    shares: Vec<Vec<Heard>>,
+}
+
+impl News {
+    /// Finds for each of some nodes, which are numbered from `first` on, the drains within `reach` to which it is news.
+    pub fn spread(&mut self, drains: &Drains, first: u32, positions: &[Vec3], reach: f32) {
+        let size = 256;
+        let count = positions.len().div_ceil(size);
+        if self.shares.len() < count {
+            self.shares.resize_with(count, Vec::new);
+        }
+        self.shares.iter_mut().for_each(Vec::clear);
+        crate::synthesis::colonization::parallel::for_each(&mut self.shares[..count], |share, heard| {
+            let start = share * size;
+            let end = positions.len().min(start + size);
+            for (node, &position) in (first + start as u32..).zip(&positions[start..end]) {
+                drains.grid.for_each_within(position, reach, |drain, distance| {
+                    let known = &drains.hearing[drain as usize];
+                    if distance < known.distance || distance < known.closest {
+                        heard.push(Heard { node, drain, distance });
+                    }
+                });
+            }
+        });
+    }
+
+    /// What is heard, by the number of the nodes.
+    pub fn iter(&self) -> impl Iterator<Item = Heard> + '_ {
+        self.shares.iter().flatten().copied()
+    }
+}
+
 /// The attraction points of one system.
 #[derive(Debug, Default)]
 pub(crate) struct Drains {
@@ -226,24 +271,22 @@ impl Drains {
         }
     }
 
-    /// Makes a new open node known to the drains within `reach` of it, which ask for the `direction` of its segment. Of two
-    /// nodes at one distance the older stays.
-    pub fn announce(&mut self, node: u32, position: Vec3, direction: Vec3, reach: f32) {
-        let Self { grid, hearing, states, waiting, awake, .. } = self;
-        grid.for_each_within(position, reach, |slot, distance| {
-            let own = &mut hearing[slot as usize];
-            own.closest = own.closest.min(distance);
-            if distance < own.distance {
-                detach(hearing, waiting, slot);
-                let cos = cos_at(direction, position, grid.point(slot));
-                attach(hearing, waiting, slot, node, distance, cos);
-                let state = &mut states[slot as usize];
-                if *state == State::Asleep {
-                    awake.push(slot);
-                }
-                *state = State::Awake;
+    /// Lets a drain know of a new open node with a segment in the given `direction`. Of two nodes at one distance the older
+    /// stays.
+    pub fn hear(&mut self, heard: Heard, position: Vec3, direction: Vec3) {
+        let Heard { node, drain: slot, distance } = heard;
+        let own = &mut self.hearing[slot as usize];
+        own.closest = own.closest.min(distance);
+        if distance < own.distance {
+            self.detach(slot);
+            let cos = cos_at(direction, position, self.grid.point(slot));
+            self.attach(slot, node, distance, cos);
+            let state = &mut self.states[slot as usize];
+            if *state == State::Asleep {
+                self.awake.push(slot);
             }
-        });
+            *state = State::Awake;
+        }
     }
 
     fn attach(&mut self, slot: u32, node: u32, distance: f32, cos: f32) {

@@ -379,12 +379,7 @@ impl PointGrid {
     /// Whether a point lies within `radius` of `center`, the radius included.
     pub fn any_within(&self, center: Vec3, radius: f32) -> bool {
         let limit = radius * radius;
-        let local = self.local(center);
-        // The centre's own cell answers for most of a filled tissue.
-        if self.chain_reaches(self.head(self.cell_at(local)), center, limit) {
-            return true;
-        }
-        let (low, high) = self.cells_around(local, radius);
+        let (low, high) = self.cells_around(self.local(center), radius);
         let mut found = false;
         self.for_cells(low, high, |head| {
             found = self.chain_reaches(head, center, limit);
@@ -393,7 +388,7 @@ impl PointGrid {
         found
     }
 
-    /// Marks those centres that have a point within `radius` in the first block of their own cell: the quickest question,
+    /// Marks those centres that have a point within `radius` in the first two blocks of their own cell: the quickest question,
     /// and mostly enough in space that is filled. The others stay as they are.
     ///
     /// Questions are asked a step at a time for many centres, so that the processor waits for the memory of all of them at
@@ -406,7 +401,9 @@ impl PointGrid {
                 *head = self.head(self.cell_of(center));
             }
             for ((&head, &center), mark) in heads.iter().zip(centers).zip(marks) {
-                *mark |= self.blocks[head as usize].distances(center).cmple(limit).any();
+                let first = self.blocks[head as usize].distances(center).cmple(limit);
+                let second = self.blocks[self.next[head as usize] as usize].distances(center).cmple(limit);
+                *mark |= (first | second).any();
             }
         }
     }

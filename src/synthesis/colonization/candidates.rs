@@ -10,11 +10,11 @@ use crate::synthesis::tissue::Tissue;
 use bevy_math::Vec3;
 
 /// Most candidates in a block.
-const BLOCK: u32 = 4096;
+const BLOCK: u32 = 1024;
 /// Bits of the stream's position that a block has to itself: a hundred numbers and more for each candidate.
 const STRETCH: u32 = 20;
 /// Bits of the stream's position for the blocks of a step: more than 2³² candidates need. The steps have the bits above.
-const BLOCKS: u32 = 21;
+const BLOCKS: u32 = 22;
 /// Fewest candidates that are looked at in the order in which they lie in space.
 const WORTH_SORTING: usize = 8192;
 

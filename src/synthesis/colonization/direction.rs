@@ -17,17 +17,16 @@ pub(crate) enum Decision {
     Rest,
 }
 
-/// Decides for a node that hears the given drains. `angles` is scratch.
+/// Decides for a node that hears the given drains.
 pub(crate) fn decide(
     forest: &Forest,
     lengths: &Lengths,
     node: u32,
-    drains: &[Vec3],
-    angles: &mut Vec<f32>,
+    drains: impl ExactSizeIterator<Item = Vec3> + Clone,
 ) -> Decision {
     let index = node as usize;
     let position = forest.tree.positions()[index];
-    let pull: Vec3 = drains.iter().map(|drain| (drain - position).normalize_or_zero()).sum();
+    let pull: Vec3 = drains.clone().map(|drain| (drain - position).normalize_or_zero()).sum();
     let mean = pull.try_normalize();
     if forest.is_root(node) {
         return mean.map_or(Decision::Rest, Decision::Extend);
@@ -42,7 +41,7 @@ pub(crate) fn decide(
     }
     let growth = mean.map_or(along, |mean| mix(along, mean, lengths.direction_weight));
     if drains.len() >= 2
-        && spread(position, along, drains, lengths.angle_spread, angles) >= lengths.bifurcation_threshold
+        && spread(position, along, drains.clone(), lengths.angle_spread) >= lengths.bifurcation_threshold
     {
         return Decision::Bifurcate(bifurcate(position, growth, drains, lengths.half_bifurcation));
     }
@@ -65,14 +64,17 @@ fn rotate(vector: Vec3, axis: Vec3, angle: f32) -> Vec3 {
     Quat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos) * vector
 }
 
-/// Spread, in radians, of the angles between a direction and the directions to the drains. `angles` is scratch.
-fn spread(position: Vec3, along: Vec3, drains: &[Vec3], measure: AngleSpread, angles: &mut Vec<f32>) -> f32 {
-    let angle = |drain: &Vec3| ops::acos(along.dot((drain - position).normalize_or(along)).clamp(-1.0, 1.0));
-    angles.clear();
-    angles.extend(drains.iter().map(angle));
+/// Spread, in radians, of the angles between a direction and the directions to the drains.
+fn spread(
+    position: Vec3,
+    along: Vec3,
+    drains: impl ExactSizeIterator<Item = Vec3> + Clone,
+    measure: AngleSpread,
+) -> f32 {
+    let angle = |drain: Vec3| ops::acos(along.dot((drain - position).normalize_or(along)).clamp(-1.0, 1.0));
     let count = drains.len() as f32;
-    let mean = angles.iter().sum::<f32>() / count;
-    let squares: f32 = angles.iter().map(|angle| angle - mean).map(|off| off * off).sum();
+    let mean = drains.clone().map(angle).sum::<f32>() / count;
+    let squares: f32 = drains.map(angle).map(|angle| angle - mean).map(|off| off * off).sum();
     match measure {
         AngleSpread::StandardDeviation => (squares / count).sqrt(),
         AngleSpread::RootSumOfSquares => squares.sqrt(),
@@ -81,8 +83,13 @@ fn spread(position: Vec3, along: Vec3, drains: &[Vec3], measure: AngleSpread, an
 
 /// Two directions at the Murray angle about the growth direction, in the plane through the node and the drains' principal
 /// line.
-fn bifurcate(position: Vec3, growth: Vec3, drains: &[Vec3], half_angle: f32) -> [Vec3; 2] {
-    let center = drains.iter().sum::<Vec3>() / drains.len() as f32;
+fn bifurcate(
+    position: Vec3,
+    growth: Vec3,
+    drains: impl ExactSizeIterator<Item = Vec3> + Clone,
+    half_angle: f32,
+) -> [Vec3; 2] {
+    let center = drains.clone().sum::<Vec3>() / drains.len() as f32;
     let line = principal_line(center, drains);
     // Where node, centre and line are in a row every plane holds them.
     let normal = (center - position).cross(line).try_normalize().unwrap_or_else(|| growth.any_orthonormal_vector());
@@ -94,13 +101,13 @@ fn bifurcate(position: Vec3, growth: Vec3, drains: &[Vec3], half_angle: f32) -> 
 
 /// Direction of the line through `center` with the least squared distances to the points: the eigenvector of their
 /// covariance with the largest eigenvalue. Its sign is fixed, so that the daughters' order is.
-fn principal_line(center: Vec3, points: &[Vec3]) -> Vec3 {
+fn principal_line(center: Vec3, points: impl Iterator<Item = Vec3> + Clone) -> Vec3 {
     // Relative to their extent, so that the covariance neither over- nor underflows.
-    let extent = points.iter().map(|point| (point - center).abs().max_element()).fold(0.0, f32::max);
+    let extent = points.clone().map(|point| (point - center).abs().max_element()).fold(0.0, f32::max);
     if extent <= 0.0 {
         return Vec3::X;
     }
-    let covariance = points.iter().fold(Matrix3::<f64>::zeros(), |sum, point| {
+    let covariance = points.fold(Matrix3::<f64>::zeros(), |sum, point| {
         let offset = ((point - center) / extent).as_dvec3();
         let offset = Vector3::new(offset.x, offset.y, offset.z);
         sum + offset * offset.transpose()

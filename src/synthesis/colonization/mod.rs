@@ -13,7 +13,7 @@ mod candidates;
 mod direction;
 mod forest;
 mod lengths;
-mod parallel;
+pub(crate) mod parallel;
 mod perception;
 pub mod settings;
 mod system_growth;
@@ -208,7 +208,7 @@ impl Growth {
         let (tissue, settings) = (self.tissue.as_ref(), &self.settings);
         let (candidates, vacancy) = (&mut self.candidates, &mut self.vacancy);
         let ([arteries, veins], handed, links) = (&mut self.systems, &mut self.handed, &mut self.links);
-        parallel::among_threads(|| {
+        parallel::with_company(|| {
             for step in first..=last.saturating_add(1) {
                 parallel::join(
                     || step <= last && grow_arteries(arteries, candidates, vacancy, tissue, settings, step).0 > 0,

@@ -1,8 +1,15 @@
 //! Maps over many items, on all threads where that pays, with the same result on any number of them.
 
-/// Fewest items worth handing to other threads.
+/// Fewest items worth handing to another thread, where each takes some tenths of a microsecond.
 #[cfg(feature = "parallel")]
-const WORTH_SHARING: usize = 2048;
+const WORTH_SHARING: usize = 256;
+
+/// How many of so many items one thread takes at a time; `None` where they are not worth sharing.
+#[cfg(feature = "parallel")]
+fn share_of(items: usize) -> Option<usize> {
+    let threads = rayon::current_num_threads();
+    (threads > 1 && items >= 2 * WORTH_SHARING).then(|| items.div_ceil(4 * threads).max(WORTH_SHARING))
+}
 
 /// Does the same to every item, which is also told its index. Each item is worth a thread of its own.
 pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + Sync) {
@@ -15,12 +22,26 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + S
     items.iter_mut().enumerate().for_each(|(index, item)| act(index, item));
 }
 
-/// Does something on one of the threads that share work, where there are any: what is shared on the way is then handed from
-/// one to the other, and nobody has to be woken for it each time.
-pub(crate) fn among_threads<R: Send>(act: impl FnOnce() -> R + Send) -> R {
+/// Does something that shares a little work now and then, while another thread stays awake to take its part at once. To wake
+/// it each time takes as long as a step.
+pub(crate) fn with_company<R: Send>(act: impl FnOnce() -> R + Send) -> R {
     #[cfg(feature = "parallel")]
     if rayon::current_num_threads() > 1 {
-        return rayon::scope(|_| act());
+        use std::sync::atomic::{AtomicBool, Ordering};
+        let done = AtomicBool::new(false);
+        let leading = || {
+            let result = act();
+            done.store(true, Ordering::Release);
+            result
+        };
+        let standing_by = || {
+            while !done.load(Ordering::Acquire) {
+                if rayon::yield_now() != Some(rayon::Yield::Executed) {
+                    std::hint::spin_loop();
+                }
+            }
+        };
+        return rayon::join(leading, standing_by).0;
     }
     act()
 }
@@ -43,9 +64,8 @@ where
     outputs.clear();
     outputs.resize(inputs.len(), blank);
     #[cfg(feature = "parallel")]
-    if inputs.len() >= WORTH_SHARING && rayon::current_num_threads() > 1 {
+    if let Some(share) = share_of(inputs.len()) {
         use rayon::prelude::*;
-        let share = inputs.len().div_ceil(4 * rayon::current_num_threads()).max(256);
         outputs.par_chunks_mut(share).zip(inputs.par_chunks(share)).for_each(|(outputs, inputs)| {
             for (output, input) in outputs.iter_mut().zip(inputs) {
                 *output = map(input);
@@ -61,9 +81,8 @@ where
 /// Lets `act` fill what belongs to each of the inputs, chunk by chunk.
 pub(crate) fn zip_chunks<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], act: impl Fn(&[I], &mut [O]) + Sync) {
     #[cfg(feature = "parallel")]
-    if inputs.len() >= WORTH_SHARING && rayon::current_num_threads() > 1 {
+    if let Some(share) = share_of(inputs.len()) {
         use rayon::prelude::*;
-        let share = inputs.len().div_ceil(4 * rayon::current_num_threads()).max(256);
         inputs.par_chunks(share).zip(outputs.par_chunks_mut(share)).for_each(|(inputs, outputs)| act(inputs, outputs));
         return;
     }

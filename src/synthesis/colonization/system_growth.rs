@@ -4,13 +4,15 @@ use super::SystemReport;
 use super::direction::{Decision, decide};
 use super::forest::Forest;
 use super::lengths::Lengths;
+use super::parallel;
 use super::perception::{self, Pull, Search};
 use super::settings::SystemSettings;
-use crate::synthesis::attraction::Drains;
+use crate::synthesis::attraction::{Drains, News};
 use crate::synthesis::haemodynamics::BedLink;
 use crate::synthesis::tissue::{Tissue, TissuePoint};
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d};
+use std::ops::Range;
 
 /// Where new nodes may be put in a step.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +46,14 @@ pub(crate) struct Supplied {
     pub node: u32,
 }
 
+/// A node that grows, and the ends of its new segments.
+#[derive(Clone, Copy, Debug, Default)]
+struct Growing {
+    node: u32,
+    count: usize,
+    tips: [TissuePoint; 2],
+}
+
 /// The forest and the drains of one system, with the lengths in force.
 #[derive(Debug)]
 pub(crate) struct SystemGrowth {
@@ -55,9 +65,10 @@ pub(crate) struct SystemGrowth {
     settings: SystemSettings,
     search: Search,
     pulls: Vec<Pull>,
-    /// Positions of the drains that pull at one node, and the angles under which it sees them.
-    pulling: Vec<Vec3>,
-    angles: Vec<f32>,
+    /// Which pulls are at the same node, and where it grows to.
+    pulled: Vec<Range<usize>>,
+    growing: Vec<Growing>,
+    news: News,
     /// Drains supplied in the last step.
     supplied: Vec<Supplied>,
     /// Of drains that came from the other system, the node there that supplied them, by slot.
@@ -67,7 +78,7 @@ pub(crate) struct SystemGrowth {
 /// A new node nearer than this share of a step length to another one is not made.
 const LEAST_SEPARATION: f32 = 1e-3;
 /// Cells are laid anew once their side has left this range of the side that fits.
-const FITTING_CELLS: std::ops::Range<f32> = 0.6..1.5;
+const FITTING_CELLS: Range<f32> = 0.6..1.5;
 
 impl SystemGrowth {
     /// A system without nodes or drains.
@@ -81,8 +92,9 @@ impl SystemGrowth {
             settings: settings.clone(),
             search: Search::default(),
             pulls: Vec::new(),
-            pulling: Vec::new(),
-            angles: Vec::new(),
+            pulled: Vec::new(),
+            growing: Vec::new(),
+            news: News::default(),
             supplied: Vec::new(),
             givers: Vec::new(),
         };
@@ -169,23 +181,15 @@ impl SystemGrowth {
         let first_new = self.forest.tree.len() as u32;
         self.forest.set_tip_radius(self.lengths.terminal_radius);
         perception::associate(&self.forest, &self.lengths, &mut self.drains, &mut self.search, &mut self.pulls);
-        let mut start = 0;
-        while start < self.pulls.len() {
-            let node = self.pulls[start].node;
-            let end = start + self.pulls[start..].iter().take_while(|pull| pull.node == node).count();
-            self.pulling.clear();
-            self.pulling.extend(self.pulls[start..end].iter().map(|pull| self.drains.position(pull.drain)));
-            match decide(&self.forest, &self.lengths, node, &self.pulling, &mut self.angles) {
-                Decision::Extend(direction) => self.extend(node, direction, ground, step),
-                Decision::Bifurcate(directions) => {
-                    for direction in directions {
-                        self.extend(node, direction, ground, step);
-                    }
-                }
-                Decision::Rest => {}
+        self.decide(ground);
+        let mut growing = std::mem::take(&mut self.growing);
+        for node in &growing {
+            for &tip in &node.tips[..node.count] {
+                self.extend(node.node, tip, step);
             }
-            start = end;
         }
+        growing.clear();
+        self.growing = growing;
         self.spread_news(first_new);
         self.kill();
         SystemReport {
@@ -196,10 +200,30 @@ impl SystemGrowth {
         }
     }
 
+    /// Decides for every node that drains pull at where it grows to.
+    fn decide(&mut self, ground: Ground<'_>) {
+        let Self { forest, drains, lengths, pulls, pulled, growing, .. } = self;
+        pulled.clear();
+        pulled.extend(pulls.chunk_by(|a, b| a.node == b.node).map(<[Pull]>::len).scan(0, |end, len| {
+            *end += len;
+            Some(*end - len..*end)
+        }));
+        parallel::map_into(pulled, growing, Growing::default(), |range| {
+            let pulls = &pulls[range.clone()];
+            let node = pulls[0].node;
+            let position = forest.tree.positions()[node as usize];
+            let place = |direction: Vec3| ground.place(position + direction * lengths.step);
+            let drains = pulls.iter().map(|pull| drains.position(pull.drain));
+            match decide(forest, lengths, node, drains) {
+                Decision::Extend(direction) => Growing { node, count: 1, tips: [place(direction), TissuePoint::default()] },
+                Decision::Bifurcate(directions) => Growing { node, count: 2, tips: directions.map(place) },
+                Decision::Rest => Growing { node, ..Growing::default() },
+            }
+        });
+    }
+
     /// Adds a segment to a node, unless its end would lie on another node or nowhere.
-    fn extend(&mut self, node: u32, direction: Vec3, ground: Ground<'_>, step: u32) {
-        let from = self.forest.tree.positions()[node as usize];
-        let at = ground.place(from + direction * self.lengths.step);
+    fn extend(&mut self, node: u32, at: TissuePoint, step: u32) {
         let free = at.position.is_finite()
             && !self.forest.index().any_within(at.position, LEAST_SEPARATION * self.lengths.step);
         if free {
@@ -210,16 +234,16 @@ impl SystemGrowth {
     /// Wakes the drains to which something has happened: nodes that have children now or another sprout angle, and new
     /// nodes within reach.
     fn spread_news(&mut self, first_new: u32) {
-        let Self { forest, drains, lengths, .. } = self;
+        let Self { forest, drains, lengths, news, .. } = self;
         let nodes = forest.tree.len() as u32;
         for node in first_new..nodes {
             let parent = forest.tree.parents()[node as usize];
             drains.wake(parent, !perception::is_open(forest, lengths, parent));
         }
         forest.sum_up(|node| drains.wake(node, false));
-        for node in first_new..nodes {
-            let index = node as usize;
-            drains.announce(node, forest.tree.positions()[index], forest.directions[index], lengths.reach());
+        news.spread(drains, first_new, &forest.tree.positions()[first_new as usize..], lengths.reach());
+        for heard in news.iter() {
+            drains.hear(heard, forest.tree.positions()[heard.node as usize], forest.directions[heard.node as usize]);
         }
     }
 

@@ -50,7 +50,7 @@ use bevy_math::{Vec3, bounding::Aabb3d};
 use std::fmt::Debug;
 
 /// A point of a tissue, found from a point nearby.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TissuePoint {
     /// Where it is, in tissue lengths.
     pub position: Vec3,
