@@ -69,7 +69,7 @@ pub mod prelude {
     pub use crate::plugin::{
         BloodLoss, Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, GrowthAction, GrowthBudget,
         GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, OrganVessels,
-        Perfusion, SegmentColoring, Vasculature, VesselAppearance, VesselSystem, VesselWounds, Vessels,
+        Perfusion, SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystem, VesselWounds, Vessels,
     };
     pub use crate::synthesis::colonization::ColonizationSettings;
     pub use crate::synthesis::preset::PresetName;

@@ -23,6 +23,7 @@ mod deformation;
 pub mod diagnostics;
 mod growth;
 mod growth_state;
+mod journal;
 mod messages;
 mod open_ends;
 mod operations;
@@ -46,14 +47,15 @@ pub use components::{
     GrowthControl, GrowthPhase, GrowthProgress, OrganVessels, SegmentColoring, Vasculature, VesselAppearance,
     VesselSystem, VesselsOf,
 };
-pub use cutting::CuttableVessels;
+pub use cutting::{CuttableVessels, Stroke};
 pub use deformation::{FollowsMesh, RestMesh};
 pub use growth::{GrowthBudget, GrowthFrame};
 pub use growth_state::GrowthState;
 pub use messages::{GrowthAction, GrowthCommand, GrowthFailed, GrowthFinished, GrowthStarted, OrganError};
 pub use open_ends::{OpenEnd, OpenEndEntities};
 pub use operations::{
-    OperationError, OperationKind, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,
+    OperationError, OperationKind, StrokeId, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed,
+    VesselSite,
 };
 pub use organ_mesh::{OrganMeshError, read_mesh};
 pub use perfusion::{
