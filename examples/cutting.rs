@@ -22,12 +22,18 @@ mod breathing;
 mod common;
 #[path = "common/figures.rs"]
 mod figures;
+#[path = "common/film.rs"]
+mod film;
 #[path = "common/instruments.rs"]
 mod instruments;
 #[path = "common/operation.rs"]
 mod operation;
 #[path = "common/organ_file.rs"]
 mod organ_file;
+#[path = "common/skin.rs"]
+mod skin;
+#[path = "common/surface.rs"]
+mod surface;
 #[path = "common/wish.rs"]
 mod wish;
 
@@ -49,9 +55,10 @@ use common::{
     studio::{StudioPlugin, front_view, moved, to_unit_size},
 };
 use figures::FiguresPlugin;
-use instruments::{INSTRUMENTS_HELP, InstrumentsPlugin, Surface};
+use instruments::{INSTRUMENTS_HELP, InstrumentsPlugin};
 use operation::{OperationPlugin, Script};
 use organ_file::{OrganFile, OrganFilePlugin, OrganLoaded};
+use surface::Surface;
 use wish::OrganArgs;
 
 /// Cut, bleed, clamp.
