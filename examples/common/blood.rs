@@ -20,10 +20,10 @@ use bevy_vessels::{
 
 /// Radius of a drop as a share of the vessel's, and the limits of it, in metres.
 const DROP_SHARE: f32 = 0.8;
-const SMALLEST: f32 = 0.000_2;
-const LARGEST: f32 = 0.000_38;
+const SMALLEST: f32 = 0.000_15;
+const LARGEST: f32 = 0.000_26;
 /// Most drops in the air.
-const MOST_DROPS: usize = 3000;
+const MOST_DROPS: usize = 5000;
 /// Slowest blood that leaves in a jet, in m/s.
 const JET: f64 = 0.35;
 /// Where drops end that miss the organ. World units.
@@ -34,7 +34,7 @@ const CLEAR: f32 = 0.02;
 const BREAKS_UP: f32 = 0.05;
 const APART: f32 = 0.012;
 /// Seconds over which the eye, or a camera, sees a drop: fast ones are streaks.
-const EXPOSURE: f32 = 0.0035;
+const EXPOSURE: f32 = 0.004;
 
 /// Open ends drip, drops fall, blood runs over the organ.
 pub struct BloodPlugin;
@@ -116,7 +116,7 @@ fn bleed(
         material: materials.add(StandardMaterial {
             base_color: Color::linear_rgb(0.15, 0.002, 0.004),
             perceptual_roughness: 0.3,
-            reflectance: 0.3,
+            reflectance: 0.15,
             ..default()
         }),
     });
