@@ -1,8 +1,9 @@
 //! Blood on the organ: a film that wells up, runs down and pools, and breathes with the organ beneath it.
 //!
 //! The film is a depth on each cell of the [`Skin`]. What stands above a thin layer that sticks runs down the slope, as
-//! fast as a thin film of blood does, and its own depth spreads it; at the edge it stands before it wets what is dry. None is lost: what hangs
-//! from below drips off. It is drawn as one mesh over the wet cells, clear where it is thin and dark where it is deep.
+//! fast as a thin film of blood does, and its own depth spreads it; at the edge it stands before it wets what is dry. None
+//! is lost: what hangs from below drips off. It is drawn as one mesh over the wet cells, clear where it is thin and dark
+//! where it is deep.
 
 use super::{skin::Skin, surface::Surface};
 use bevy::{
