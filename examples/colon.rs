@@ -31,12 +31,11 @@ use clap::Parser;
 use common::{
     controls::{ControlsPlugin, HELP, Organ, OrganAssets, tell},
     photo::{Shot, Shots},
-    studio::{StudioArgs, StudioPlugin, View, front_view, moved, to_unit_size},
+    studio::{StudioPlugin, View, front_view, moved, to_unit_size},
 };
 use endoscopy::{Lumen, look_inside};
 use organ_file::{OrganFile, OrganFilePlugin, OrganLoaded};
-use std::path::PathBuf;
-use wish::{Mode, WishArgs};
+use wish::{Mode, OrganArgs};
 
 const MORE_HELP: &str = "N  next seed\nI  inside, up and down travel";
 
@@ -44,19 +43,14 @@ const MORE_HELP: &str = "N  next seed\nI  inside, up and down travel";
 #[derive(Parser, Resource, Clone)]
 struct Args {
     #[command(flatten)]
-    studio: StudioArgs,
-    /// Grow on the organ in this glTF file instead of a procedural colon.
-    #[arg(long)]
-    mesh: Option<PathBuf>,
-    #[command(flatten)]
-    wish: WishArgs,
+    organ: OrganArgs,
 }
 
 fn main() -> AppExit {
     let args = Args::parse();
     let title = "Vessels of the colon";
     App::new()
-        .add_plugins(StudioPlugin { args: args.studio.clone(), title, help: HELP, more_help: MORE_HELP })
+        .add_plugins(StudioPlugin { args: args.organ.studio.clone(), title, help: HELP, more_help: MORE_HELP })
         .add_plugins((VesselPlugin::default(), ControlsPlugin, OrganFilePlugin))
         .insert_resource(args)
         .add_observer(spawn_loaded)
@@ -66,7 +60,7 @@ fn main() -> AppExit {
 }
 
 fn spawn_organ(mut commands: Commands, args: Res<Args>) {
-    match &args.mesh {
+    match &args.organ.mesh {
         Some(path) => commands.insert_resource(OrganFile::new(path.clone())),
         None => commands.run_system_cached(spawn_colon),
     }
@@ -81,25 +75,25 @@ fn next_seed(
 ) {
     if keys.just_pressed(KeyCode::KeyN) {
         organs.iter().for_each(|organ| commands.entity(organ).despawn());
-        args.wish.seed += 1;
+        args.organ.seed += 1;
         commands.run_system_cached(spawn_organ);
     }
 }
 
 /// The colon of the seed. Its outer and its inner side are organs of their own, joined by a rim.
 fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) -> Result {
-    let colon = ColonSettings { seed: args.wish.seed, triangles: 120_000, ..default() }.generate()?;
+    let colon = ColonSettings { seed: args.organ.seed, triangles: 120_000, ..default() }.generate()?;
     let place = to_unit_size(colon.mesh.bounds());
     let mut spawn = |name: &'static str, mesh: OrganMesh, vessels: Option<Vasculature>| {
-        let mut organ = assets.spawn(&mut commands, mesh.into(), args.wish.tint(Color::WHITE), place);
+        let mut organ = assets.spawn(&mut commands, mesh.into(), args.organ.tint(Color::WHITE), place);
         organ.insert(Name::new(name));
         vessels.map(|vessels| organ.insert(vessels));
     };
-    let outside = args.wish.vessels(Some(&colon.roots), 1.4);
-    if args.wish.mode == Mode::Surface {
+    let outside = args.organ.vessels(Some(&colon.roots), 1.4);
+    if args.organ.mode == Mode::Surface {
         spawn("colon", colon.mesh.part(colon.outer.clone()), Some(outside));
         spawn("rim", colon.mesh.part(colon.outer.end..colon.inner.start), None);
-        let inside = args.wish.vessels(Some(&colon.inner_roots), 0.4);
+        let inside = args.organ.vessels(Some(&colon.inner_roots), 0.4);
         spawn("mucosa", colon.mesh.part(colon.inner.clone()), Some(inside));
     } else {
         spawn("colon", colon.mesh.clone(), Some(outside));
@@ -122,9 +116,9 @@ fn spawn_loaded(
     mut assets: OrganAssets,
     mut shots: ResMut<Shots>,
 ) {
-    let tint = args.wish.tint(Color::srgb(0.74, 0.42, 0.37));
+    let tint = args.organ.tint(OrganArgs::FLESH);
     assets
         .spawn(&mut commands, loaded.mesh.clone(), tint, loaded.place)
-        .insert((Name::new("organ"), args.wish.vessels(None, 1.4)));
+        .insert((Name::new("organ"), args.organ.vessels(None, 1.4)));
     shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 42.0, endoscope: false }];
 }

@@ -22,12 +22,18 @@ mod breathing;
 mod common;
 #[path = "common/figures.rs"]
 mod figures;
+#[path = "common/film.rs"]
+mod film;
 #[path = "common/instruments.rs"]
 mod instruments;
 #[path = "common/operation.rs"]
 mod operation;
 #[path = "common/organ_file.rs"]
 mod organ_file;
+#[path = "common/skin.rs"]
+mod skin;
+#[path = "common/surface.rs"]
+mod surface;
 #[path = "common/wish.rs"]
 mod wish;
 
@@ -46,35 +52,30 @@ use breathing::BreathingPlugin;
 use clap::Parser;
 use common::{
     controls::{ControlsPlugin, HELP, OrganAssets},
-    studio::{StudioArgs, StudioPlugin, front_view, moved, to_unit_size},
+    studio::{StudioPlugin, front_view, moved, to_unit_size},
 };
 use figures::FiguresPlugin;
-use instruments::{INSTRUMENTS_HELP, InstrumentsPlugin, Surface};
+use instruments::{INSTRUMENTS_HELP, InstrumentsPlugin};
 use operation::{OperationPlugin, Script};
 use organ_file::{OrganFile, OrganFilePlugin, OrganLoaded};
-use std::path::PathBuf;
-use wish::WishArgs;
+use surface::Surface;
+use wish::OrganArgs;
 
 /// Cut, bleed, clamp.
 #[derive(Parser, Resource, Clone)]
 struct Args {
     #[command(flatten)]
-    studio: StudioArgs,
-    /// Operate on the organ in this glTF file, in metres, instead of a procedural colon.
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    organ: OrganArgs,
     /// What is done where there is no window.
     #[arg(long, value_enum, default_value_t)]
     script: Script,
-    #[command(flatten)]
-    wish: WishArgs,
 }
 
 fn main() -> AppExit {
     let args = Args::parse();
     let title = "Cut, bleed, clamp";
     App::new()
-        .add_plugins(StudioPlugin { args: args.studio.clone(), title, help: HELP, more_help: INSTRUMENTS_HELP })
+        .add_plugins(StudioPlugin { args: args.organ.studio.clone(), title, help: HELP, more_help: INSTRUMENTS_HELP })
         .add_plugins((VesselPlugin::default(), ControlsPlugin, OrganFilePlugin))
         .add_plugins((InstrumentsPlugin, BloodPlugin, BreathingPlugin, FiguresPlugin, OperationPlugin(args.script)))
         .insert_resource(args)
@@ -90,16 +91,16 @@ fn perfusion() -> impl Bundle {
 }
 
 fn spawn_organ(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets) -> Result {
-    if let Some(path) = &args.mesh {
+    if let Some(path) = &args.organ.mesh {
         commands.insert_resource(OrganFile::new(path.clone()));
         return Ok(());
     }
-    let colon = ColonSettings { seed: args.wish.seed, triangles: 60_000, ..default() }.generate()?;
+    let colon = ColonSettings { seed: args.organ.seed, triangles: 60_000, ..default() }.generate()?;
     let place = to_unit_size(colon.mesh.bounds());
     commands.insert_resource(Surface::new(&Mesh::from(colon.mesh.clone()), &place, moved(&colon.front, &place).eye)?);
-    let tint = args.wish.tint(Color::WHITE);
+    let tint = args.organ.tint(Color::WHITE);
     let outside = colon.mesh.part(colon.outer.clone()).into();
-    let vessels = args.wish.vessels(Some(&colon.roots), 0.7);
+    let vessels = args.organ.vessels(Some(&colon.roots), 0.7);
     assets.spawn(&mut commands, outside, tint, place).insert((Name::new("colon"), vessels, perfusion()));
     let inside = colon.mesh.part(colon.outer.end..colon.inner.end).into();
     assets.spawn(&mut commands, inside, tint, place).insert(Name::new("inside"));
@@ -109,8 +110,8 @@ fn spawn_organ(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets)
 /// The organ of a file.
 fn spawn_loaded(loaded: On<OrganLoaded>, mut commands: Commands, args: Res<Args>, mut assets: OrganAssets) -> Result {
     commands.insert_resource(Surface::new(&loaded.mesh, &loaded.place, front_view().eye)?);
-    let tint = args.wish.tint(Color::srgb(0.74, 0.42, 0.37));
-    let vessels = args.wish.vessels(None, 0.7);
+    let tint = args.organ.tint(OrganArgs::FLESH);
+    let vessels = args.organ.vessels(None, 0.7);
     let organ = (Name::new("organ"), vessels, perfusion());
     assets.spawn(&mut commands, loaded.mesh.clone(), tint, loaded.place).insert(organ);
     Ok(())

@@ -50,7 +50,8 @@
 //! **My organ bleeds by the litre, or not at all.** Blood has a size: say how long a unit of the mesh is, in
 //! [`Perfusion::scale`](plugin::Perfusion::scale).
 //!
-//! **My organ is a soft body.** Put [`FollowsMesh`](plugin::FollowsMesh) on it, and its vessels follow.
+//! **My organ is a soft body.** Put [`FollowsMesh`](plugin::FollowsMesh) on it, and its vessels follow its surface; or
+//! [`FollowsTetrahedra`](plugin::FollowsTetrahedra), and they follow its inside.
 //!
 //! **Why does nothing grow?** Look at the entity's [`GrowthProgress`](plugin::GrowthProgress) and the log: a mesh that
 //! cannot be used, or settings outside their limits, are named there with what to change.
@@ -67,9 +68,10 @@ pub mod render;
 pub mod prelude {
     pub use crate::VesselPlugin;
     pub use crate::plugin::{
-        BloodLoss, Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, GrowthAction, GrowthBudget,
-        GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, OrganVessels,
-        Perfusion, SegmentColoring, Vasculature, VesselAppearance, VesselSystem, VesselWounds, Vessels,
+        BloodLoss, Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, FollowsTetrahedra, GrowthAction,
+        GrowthBudget, GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd,
+        OrganVessels, Perfusion, SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystem, VesselWounds,
+        Vessels,
     };
     pub use crate::synthesis::colonization::ColonizationSettings;
     pub use crate::synthesis::preset::PresetName;

@@ -25,7 +25,12 @@ fn generate(arguments: &[&str]) -> Vec<Value> {
 }
 
 fn output(arguments: &[&str]) -> Result<String, command::Failure> {
-    let all = [&["generate", "--steps=12", "--samples=300"], arguments].concat();
+    run(&[&["--steps=12", "--samples=300"], arguments].concat())
+}
+
+/// Runs the command as it is.
+fn run(arguments: &[&str]) -> Result<String, command::Failure> {
+    let all = [&["generate"], arguments].concat();
     let options = command::Options::try_parse_from(all).map_err(|error| command::Failure::Usage(error.to_string()))?;
     let mut bytes = Vec::new();
     command::run(&options, &mut bytes)?;
@@ -216,6 +221,46 @@ fn an_organs_mesh_grows_on_its_surface_in_its_volume_and_in_stages() {
     hashes.sort();
     hashes.dedup();
     assert_eq!(hashes.len(), 9);
+}
+
+/// A ball around the origin, as an OBJ file.
+fn ball(folder: &Folder, name: &str, radius: f64) -> String {
+    use std::fmt::Write;
+    let (sectors, stacks) = (24, 12);
+    let mut text = String::new();
+    for (stack, sector) in (0..=stacks).flat_map(|stack| (0..sectors).map(move |sector| (stack, sector))) {
+        let polar = std::f64::consts::PI * f64::from(stack) / f64::from(stacks);
+        let around = std::f64::consts::TAU * f64::from(sector) / f64::from(sectors);
+        let [x, y, z] = [polar.sin() * around.cos(), polar.cos(), polar.sin() * around.sin()].map(|at| at * radius);
+        writeln!(text, "v {x} {y} {z}").expect("text");
+    }
+    for (stack, sector) in (0..stacks).flat_map(|stack| (0..sectors).map(move |sector| (stack, sector))) {
+        let [a, b] = [sector, (sector + 1) % sectors].map(|sector| stack * sectors + sector + 1);
+        writeln!(text, "f {a} {b} {}", a + sectors).expect("text");
+        writeln!(text, "f {b} {} {}", b + sectors, a + sectors).expect("text");
+    }
+    let path = folder.path(name);
+    fs::write(&path, text).expect("a file");
+    path
+}
+
+/// With default settings.
+#[test]
+fn an_organ_in_any_unit_gets_as_many_vessels() {
+    let folder = Folder::new("units");
+    for mode in ["--mode=surface", "--mode=volume"] {
+        let counts = [("metres.obj", 0.05), ("millimetres.obj", 50.0), ("toy.obj", 25.0)].map(|(name, radius)| {
+            let text = run(&["--json", "--tissue", &ball(&folder, name, radius), mode]).expect("an organ");
+            let line: Value = serde_json::from_str(&text).expect("a line of JSON");
+            ["arterial", "venous"].map(|system| line[system]["nodes"].as_f64().expect("a number of nodes"))
+        });
+        let [metres, others @ ..] = counts;
+        assert!(metres.iter().all(|&nodes| nodes > 300.0), "{mode}: {metres:?} are too few to tell");
+        for other in others {
+            let ratios = [other[0] / metres[0], other[1] / metres[1]];
+            assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.08), "{mode}: {other:?}, {metres:?} in metres");
+        }
+    }
 }
 
 #[test]

@@ -1,38 +1,48 @@
-//! Drops and pools: a small particle emitter on the CPU, which reads what each open end loses.
+//! Drops: a small particle emitter on the CPU, which reads what each open end loses.
 //!
 //! A drop is an entity; all share one mesh and one material, so that they are drawn as instances. They leave an end as
-//! fast as its blood does: arteries spurt with the pulse, veins ooze. Where they land they are added to a pool. No blood
-//! is invented or dropped: when drops are scarce they are larger.
+//! fast as its blood does, drawn out along their way: arteries spurt with the pulse in jets that break up, and where
+//! blood is slow it wells up from the wound. Where it lands it joins the [`Film`]. No blood is invented, and only what
+//! falls past the organ is dropped: when drops are scarce they are larger.
 //!
 //! Particles on the GPU take the same hook: for each [`OpenEnd`] entity the rate is `flow`, the speed `velocity`, and place
 //! and direction are those of its `GlobalTransform`. Write these into the effect's spawner and properties once a frame.
 
-use super::instruments::Surface;
+use super::{
+    film::{Film, show_film},
+    surface::Surface,
+};
 use bevy::{light::NotShadowCaster, prelude::*};
 use bevy_vessels::{
     plugin::{OpenEnd, Perfusion, VesselSystems},
     synthesis::units::Volume,
 };
 
-/// Volume of a usual drop. Smaller than one that falls from a tap, since most come out of jets.
-const DROP_ML: f64 = 0.006;
-/// Most drops in the air, and most pools.
-const MOST_DROPS: usize = 1500;
-const MOST_POOLS: usize = 1200;
-/// Height of blood that lies, in metres, and the widest pool's radius: on a curved organ it runs on from there.
-const LYING: f32 = 0.0012;
-const WIDEST_POOL: f32 = 0.006;
+/// Radius of a drop as a share of the vessel's, and the limits of it, in metres.
+const DROP_SHARE: f32 = 0.8;
+const SMALLEST: f32 = 0.000_15;
+const LARGEST: f32 = 0.000_26;
+/// Most drops in the air.
+const MOST_DROPS: usize = 5000;
+/// Slowest blood that leaves in a jet, in m/s.
+const JET: f64 = 0.35;
 /// Where drops end that miss the organ. World units.
 const FLOOR: f32 = -0.75;
 /// Seconds in which a drop clears the rim of its own wound.
 const CLEAR: f32 = 0.02;
+/// Seconds in which a jet breaks up into drops, and how far apart they may be that hang together until then, in metres.
+const BREAKS_UP: f32 = 0.05;
+const APART: f32 = 0.012;
+/// Seconds over which the eye, or a camera, sees a drop: fast ones are streaks.
+const EXPOSURE: f32 = 0.004;
 
-/// Open ends drip, drops fall, pools spread.
+/// Open ends drip, drops fall, blood runs over the organ.
 pub struct BloodPlugin;
 
 impl Plugin for BloodPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Pools>().add_systems(Update, (bleed, fall).chain().after(VesselSystems::Publish));
+        let systems = (lay_film.run_if(resource_added::<Surface>), bleed, fall, run, show_film);
+        app.add_systems(Update, systems.chain().after(VesselSystems::Publish));
     }
 }
 
@@ -41,6 +51,10 @@ impl Plugin for BloodPlugin {
 struct Drop {
     velocity: Vec3,
     volume: Volume,
+    /// Of the ball that it is in the end, in world units.
+    radius: f32,
+    /// Half of the way to the next drop of the jet, in world units.
+    drawn_out: f32,
     age: f32,
 }
 
@@ -51,17 +65,7 @@ struct Dripping {
     drops: u32,
 }
 
-/// The pools there are.
-#[derive(Resource, Default)]
-struct Pools(Vec<Pool>);
-
-struct Pool {
-    entity: Entity,
-    center: Vec3,
-    volume: Volume,
-}
-
-/// What drops and pools are made of.
+/// What drops are made of.
 #[derive(Clone)]
 struct Look {
     mesh: Handle<Mesh>,
@@ -69,39 +73,50 @@ struct Look {
 }
 
 /// Metres of a world unit: drops are as fast and as large beside the organ as they would be.
-fn metres(organs: &Query<(&Perfusion, &GlobalTransform)>) -> f32 {
-    let unit =
-        |(organ, place): (&Perfusion, &GlobalTransform)| organ.scale.metres() as f32 / place.scale().max_element();
+fn metres(organs: &Query<(&Perfusion, &Transform)>) -> f32 {
+    let unit = |(organ, place): (&Perfusion, &Transform)| organ.scale.metres() as f32 / place.scale.max_element();
     organs.iter().next().map_or(1.0, unit)
 }
 
-/// Radius of a ball of a volume, in metres.
+/// Volume of a ball of a radius in metres, and the radius of one of a volume.
+fn ball(radius: f32) -> Volume {
+    Volume::from_cubic_metres(f64::from(radius * radius * radius * 4.188_79))
+}
+
 fn ball_radius(volume: Volume) -> f32 {
     ops::cbrt(volume.cubic_metres() as f32 * 0.238_732_4)
 }
 
-/// A number from 0 to 1 that looks random: multiples of the golden ratio.
+/// A number from 0 to 1 that looks random.
 fn scattered(index: u32, salt: u32) -> f32 {
-    (index.wrapping_mul(0x9e37_79b9) ^ salt.wrapping_mul(0x85eb_ca6b)) as f32 / u32::MAX as f32
+    let mixed = (index ^ salt.wrapping_mul(0x85eb_ca6b)).wrapping_mul(0x9e37_79b9);
+    let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d);
+    (mixed ^ (mixed >> 13)) as f32 / u32::MAX as f32
 }
 
-/// Open ends let drops go, as many as they lose.
+/// An organ that has come has no blood on it.
+fn lay_film(mut commands: Commands, organs: Query<(&Perfusion, &Transform)>, surface: Res<Surface>) {
+    commands.insert_resource(Film::new(&surface, metres(&organs)));
+}
+
+/// Open ends let drops go, as many as they lose; slow blood wells up beside them.
 fn bleed(
     mut commands: Commands,
-    organs: Query<(&Perfusion, &GlobalTransform)>,
+    time: Res<Time>,
+    organs: Query<(&Perfusion, &Transform)>,
     mut ends: Query<(Entity, &OpenEnd, &GlobalTransform, Option<&mut Dripping>)>,
     drops: Query<(), With<Drop>>,
-    surface: Option<Res<Surface>>,
+    blood: (Option<Res<Surface>>, Option<ResMut<Film>>),
     assets: (ResMut<Assets<Mesh>>, Option<ResMut<Assets<StandardMaterial>>>),
     mut look: Local<Option<Look>>,
 ) {
-    let (mut meshes, Some(mut materials)) = assets else { return };
+    let ((Some(surface), Some(mut film)), (mut meshes, Some(mut materials))) = (blood, assets) else { return };
     let look = look.get_or_insert_with(|| Look {
-        mesh: meshes.add(Sphere::new(1.0).mesh().uv(12, 8)),
+        mesh: meshes.add(Sphere::new(1.0).mesh().uv(10, 7)),
         material: materials.add(StandardMaterial {
-            base_color: Color::srgb(0.42, 0.012, 0.015),
-            perceptual_roughness: 0.12,
-            reflectance: 0.55,
+            base_color: Color::linear_rgb(0.15, 0.002, 0.004),
+            perceptual_roughness: 0.3,
+            reflectance: 0.15,
             ..default()
         }),
     });
@@ -111,94 +126,103 @@ fn bleed(
             commands.entity(entity).insert(Dripping::default());
             continue;
         };
-        let pending = end.lost.ml() - dripping.lost.ml();
-        let wanted = (pending / DROP_ML) as usize;
+        let pending = Volume::from_ml(end.lost.ml() - dripping.lost.ml());
+        let Some(near) = surface.nearest_at_rest(place.translation()) else { continue };
+        if end.velocity < JET {
+            film.add(&near, pending);
+            dripping.lost = end.lost;
+            continue;
+        }
+        let width = DROP_SHARE * end.radius * place.scale().max_element() * unit;
+        let drop = ball(width.clamp(SMALLEST, LARGEST));
+        let wanted = (pending.ml() / drop.ml()) as usize;
         let count = wanted.min(room);
-        let volume = Volume::from_ml(pending / wanted.max(1) as f64 * wanted as f64 / count.max(1) as f64);
-        for _ in 0..count {
+        room -= count;
+        let volume = Volume::from_ml(drop.ml() * wanted as f64 / count.max(1) as f64);
+        let normal = surface.at_rest().triangle_normal(near.triangle);
+        for number in 0..count {
             dripping.drops += 1;
             dripping.lost = Volume::from_ml(dripping.lost.ml() + volume.ml());
-            let radius = ball_radius(volume) / unit;
-            let velocity = leave(end, place, surface.as_deref(), dripping.drops) / unit;
-            let from = place.translation() + velocity * (CLEAR * 0.2 * scattered(dripping.drops, 7));
-            let pose = Transform::from_translation(from).with_scale(Vec3::splat(radius));
-            let drop = Drop { velocity, volume, age: 0.0 };
-            commands.spawn((
-                drop,
-                Mesh3d(look.mesh.clone()),
-                MeshMaterial3d(look.material.clone()),
-                pose,
-                NotShadowCaster,
-            ));
+            let velocity = leave(end, place, normal, dripping.drops) / unit;
+            // They leave one after the other, all through the frame.
+            let interval = time.delta_secs() / count as f32;
+            let age = interval * (number as f32 + scattered(dripping.drops, 7));
+            let drawn_out = 0.5 * (velocity.length() * interval).min(APART / unit);
+            let drop = Drop { velocity, volume, radius: ball_radius(volume) / unit, drawn_out, age };
+            let pose = drop.pose(place.translation() + velocity * age);
+            let look = (Mesh3d(look.mesh.clone()), MeshMaterial3d(look.material.clone()));
+            commands.spawn((drop, look, pose, NotShadowCaster));
         }
-        room -= count;
     }
 }
 
-/// How a drop leaves an end, in metres a second: out of the lumen, and up, away from the tissue beneath.
-fn leave(end: &OpenEnd, place: &GlobalTransform, surface: Option<&Surface>, drop: u32) -> Vec3 {
-    let up = surface.and_then(|surface| surface.nearest(place.translation())).map_or(Vec3::Y, |(_, normal)| normal);
-    let spread = Vec3::from_array([1, 2, 3].map(|salt| scattered(drop, salt) - 0.5));
-    let direction = (*place.forward() + 0.7 * up + 0.35 * spread).normalize_or(up);
-    // in the mean over its section; the middle of a jet is twice as fast
-    direction * end.velocity as f32 * (0.6 + 0.9 * scattered(drop, 5))
+/// How a drop leaves an end, in metres a second: out of the lumen, and up, away from the tissue beneath. A jet wavers, and
+/// its drops stray a little.
+fn leave(end: &OpenEnd, place: &GlobalTransform, up: Vec3, drop: u32) -> Vec3 {
+    let stray = Vec3::from_array([1, 2, 3].map(|salt| scattered(drop, salt) - 0.5));
+    let waver =
+        Vec3::from_array([0.043, 0.061, 0.029].map(|pace| ops::sin(pace * drop as f32 + end.place.node.0 as f32)));
+    let direction = (*place.forward() + 0.75 * up + 0.05 * stray + 0.06 * waver).normalize_or(up);
+    direction * end.velocity as f32 * (0.95 + 0.1 * scattered(drop, 5))
 }
 
-/// Drops fall, and are added to a pool where they land.
+impl Drop {
+    /// Drawn out along its way, by its speed and as long as the jet hangs together, and as thin as its volume then allows.
+    fn pose(&self, at: Vec3) -> Transform {
+        let jet = self.drawn_out * ops::exp(-self.age * self.age / (BREAKS_UP * BREAKS_UP));
+        let half = self.radius + jet.max(0.5 * EXPOSURE * self.velocity.length());
+        let width = self.radius * (self.radius / half).sqrt();
+        let along = Dir3::new(self.velocity).unwrap_or(Dir3::NEG_Y);
+        Transform::from_translation(at)
+            .looking_to(along, along.any_orthonormal_vector())
+            .with_scale(Vec3::new(width, width, half))
+    }
+}
+
+/// Drops fall, and join the film where they land.
 fn fall(
     mut commands: Commands,
     time: Res<Time>,
-    organs: Query<(&Perfusion, &GlobalTransform)>,
-    mut drops: Query<(Entity, &mut Drop, &mut Transform, &Mesh3d, &MeshMaterial3d<StandardMaterial>)>,
-    surface: Option<Res<Surface>>,
-    mut pools: ResMut<Pools>,
+    organs: Query<(&Perfusion, &Transform)>,
+    mut drops: Query<(Entity, &mut Drop, &mut Transform), Without<Perfusion>>,
+    blood: (Option<Res<Surface>>, Option<ResMut<Film>>),
 ) {
+    let (Some(surface), Some(mut film)) = blood else { return };
     let (seconds, unit) = (time.delta_secs(), metres(&organs));
     if seconds == 0.0 {
         return;
     }
-    for (entity, mut drop, mut place, mesh, material) in &mut drops {
+    for (entity, mut drop, mut place) in &mut drops {
         drop.velocity.y -= 9.81 / unit * seconds;
         drop.age += seconds;
         let (from, to) = (place.translation, place.translation + drop.velocity * seconds);
-        let hit = surface.as_ref().and_then(|surface| surface.hit(from, to)).filter(|_| drop.age > CLEAR);
-        let floor = (to.y < FLOOR).then(|| (Vec3::new(to.x, FLOOR, to.z), Vec3::Y));
-        place.translation = to;
-        let Some((at, normal)) = hit.or(floor) else { continue };
-        let normal = if normal.dot(drop.velocity) > 0.0 { -normal } else { normal };
-        let look = Look { mesh: mesh.0.clone(), material: material.0.clone() };
-        pools.add(&mut commands, (at, normal, drop.volume), unit, &look);
-        commands.entity(entity).despawn();
+        let touched = if drop.age > CLEAR { surface.touch(from, to) } else { None };
+        if let Some((at, _)) = touched {
+            film.add(&at, drop.volume);
+            commands.entity(entity).despawn();
+        } else if to.y < FLOOR {
+            commands.entity(entity).despawn();
+        } else {
+            *place = drop.pose(to);
+        }
     }
 }
 
-impl Pools {
-    /// Adds blood to the pool that it falls into, or begins one.
-    fn add(&mut self, commands: &mut Commands, landed: (Vec3, Vec3, Volume), unit: f32, look: &Look) {
-        let (at, normal, volume) = landed;
-        let nearest = self.0.iter().enumerate().map(|(index, pool)| (pool.center.distance(at), index));
-        let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
-        let radius = |volume: Volume| (volume.cubic_metres() as f32 / (LYING * std::f32::consts::PI)).sqrt();
-        let size = |volume: Volume| Vec3::new(radius(volume), LYING.min(radius(volume)), radius(volume)) / unit;
-        let full = self.0.len() >= MOST_POOLS;
-        let joins = |&(distance, index): &(f32, usize)| {
-            let wide = radius(self.0[index].volume);
-            full || (wide < WIDEST_POOL && distance * unit < wide)
-        };
-        match nearest.filter(joins) {
-            Some((_, index)) => {
-                let pool = &mut self.0[index];
-                pool.volume = Volume::from_ml(pool.volume.ml() + volume.ml());
-                let scale = size(pool.volume);
-                commands.entity(pool.entity).entry::<Transform>().and_modify(move |mut pose| pose.scale = scale);
-            }
-            None => {
-                let turn = Quat::from_rotation_arc(Vec3::Y, normal.normalize_or(Vec3::Y));
-                let pose = Transform { translation: at, rotation: turn, scale: size(volume) };
-                let drawn = (Mesh3d(look.mesh.clone()), MeshMaterial3d(look.material.clone()), pose, NotShadowCaster);
-                let entity = commands.spawn(drawn).id();
-                self.0.push(Pool { entity, center: at, volume });
-            }
-        }
-    }
+/// The film flows, and drips from where it hangs.
+fn run(
+    mut commands: Commands,
+    time: Res<Time>,
+    blood: (Option<Res<Surface>>, Option<ResMut<Film>>),
+    organs: Query<(&Perfusion, &Transform)>,
+    looks: Query<(&Mesh3d, &MeshMaterial3d<StandardMaterial>), With<Drop>>,
+) {
+    let (Some(surface), Some(mut film)) = blood else { return };
+    let unit = metres(&organs);
+    let look = looks.iter().next().map(|(mesh, material)| (mesh.clone(), material.clone()));
+    film.flow(time.delta_secs(), |at, normal, volume| {
+        let drop = Drop { velocity: Vec3::ZERO, volume, radius: ball_radius(volume) / unit, drawn_out: 0.0, age: 0.0 };
+        let pose = drop.pose(surface.breathed(at) + normal * drop.radius);
+        let mut spawned = commands.spawn((drop, pose, NotShadowCaster));
+        look.clone().map(|look| spawned.insert(look));
+    });
 }

@@ -3,7 +3,7 @@
 //! It stands for a soft body: whoever moves vertices in the mesh asset has the vessels follow, by
 //! [`FollowsMesh`](bevy_vessels::plugin::FollowsMesh).
 
-use crate::common::controls::Organ;
+use crate::{common::controls::Organ, surface::Surface};
 use bevy::{
     mesh::{Mesh, VertexAttributeValues},
     prelude::*,
@@ -14,8 +14,7 @@ use bevy_vessels::{
 };
 use std::f32::consts::TAU;
 
-/// How far the diaphragm pushes the top of an organ, as a share of its height, and how long a breath takes.
-const DEPTH: f32 = 0.02;
+/// How long a breath takes.
 const SECONDS: f32 = 4.0;
 /// Colour that tissue without blood is multiplied by. Linear sRGB: less red than flesh, and greyer.
 const PALE: [f32; 3] = [0.92, 1.25, 1.3];
@@ -25,7 +24,8 @@ pub struct BreathingPlugin;
 
 impl Plugin for BreathingPlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(Update, (breathe, blanch).before(VesselSystems::Publish));
+        let systems = (breathe.run_if(resource_exists::<Surface>), blanch);
+        app.add_systems(Update, systems.before(VesselSystems::Publish));
     }
 }
 
@@ -34,9 +34,6 @@ impl Plugin for BreathingPlugin {
 struct Rest {
     positions: Vec<[f32; 3]>,
     colors: Vec<[f32; 4]>,
-    /// Lowest and highest point.
-    low: f32,
-    high: f32,
 }
 
 impl Rest {
@@ -46,17 +43,7 @@ impl Rest {
             Some(VertexAttributeValues::Float32x4(colors)) => colors.clone(),
             _ => vec![[1.0; 4]; positions.len()],
         };
-        let heights = positions.iter().map(|at| at[1]);
-        let (low, high) = heights.fold((f32::MAX, f32::MIN), |(low, high), y| (low.min(y), high.max(y)));
-        Some(Self { positions, colors, low, high })
-    }
-
-    /// A vertex when the chest is filled to a share: what is near the diaphragm goes down and to the front.
-    fn filled(&self, [x, y, z]: [f32; 3], breath: f32) -> [f32; 3] {
-        let height = (self.high - self.low).max(f32::MIN_POSITIVE);
-        let share = ((y - self.low) / height).clamp(0.0, 1.0);
-        let push = DEPTH * height * breath * share * share;
-        [x, y - push, z + 0.6 * push]
+        Some(Self { positions, colors })
     }
 }
 
@@ -64,8 +51,9 @@ impl Rest {
 fn breathe(
     mut commands: Commands,
     time: Res<Time>,
-    organs: Query<(Entity, &Mesh3d, Option<&Rest>), With<Organ>>,
+    organs: Query<(Entity, &Mesh3d, &Transform, Option<&Rest>), With<Organ>>,
     growing: Query<&GrowthProgress>,
+    mut surface: ResMut<Surface>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut breathed: Local<f32>,
 ) {
@@ -73,8 +61,8 @@ fn breathe(
         return;
     }
     *breathed += time.delta_secs() / SECONDS;
-    let breath = 0.5 - 0.5 * ops::cos(TAU * *breathed);
-    for (organ, mesh, rest) in &organs {
+    surface.breath = 0.5 - 0.5 * ops::cos(TAU * *breathed);
+    for (organ, mesh, place, rest) in &organs {
         let Some(mut mesh) = meshes.get_mut(mesh.id()) else { continue };
         match rest {
             None => {
@@ -83,8 +71,10 @@ fn breathe(
                 }
             }
             Some(rest) => {
+                let (to_world, to_local) = (place.compute_affine(), place.compute_affine().inverse());
+                let moved = |at: Vec3| to_local.transform_point3(surface.breathed(to_world.transform_point3(at)));
                 if let Some(VertexAttributeValues::Float32x3(now)) = mesh.attribute_mut(Mesh::ATTRIBUTE_POSITION) {
-                    now.iter_mut().zip(&rest.positions).for_each(|(now, &at)| *now = rest.filled(at, breath));
+                    now.iter_mut().zip(&rest.positions).for_each(|(now, &at)| *now = moved(at.into()).to_array());
                 }
             }
         }

@@ -1,19 +1,16 @@
-//! Instruments: what they touch, a scalpel that the mouse drags, keys for clamp and cautery, and clamps to be seen.
+//! Instruments: a scalpel that the mouse drags, keys for clamp and cautery, and clamps to be seen.
 
+use super::surface::Surface;
 use bevy::prelude::*;
 use bevy_panorbit_camera::PanOrbitCamera;
 use bevy_vessels::{
-    plugin::{CuttableVessels, Perfusion, VesselSystems, VesselWounds, read_mesh},
+    plugin::{CuttableVessels, Perfusion, Stroke, StrokeId, VesselSystems, VesselWounds},
     prelude::*,
-    synthesis::{
-        mesh::TriangleMesh,
-        tissue::TriangleIndex,
-        wound::{Blade, BladeError},
-    },
+    synthesis::wound::{Blade, BladeError},
 };
 
 /// What the keys and the mouse do.
-pub const INSTRUMENTS_HELP: &str = "right drag  scalpel\nK U  clamp on, off\nB  cautery\nZ  undo";
+pub const INSTRUMENTS_HELP: &str = "right drag  scalpel\nK U  clamp on, off\nB  cautery, while held\nZ  undo";
 
 /// How deep the scalpel goes, and how far its edge reaches out of the tissue. World units.
 const DEPTH: f32 = 0.035;
@@ -36,46 +33,15 @@ impl Plugin for InstrumentsPlugin {
     }
 }
 
-/// An organ's surface at rest, in the world: what instruments touch, and blood falls on.
-#[derive(Resource)]
-pub struct Surface {
-    mesh: TriangleMesh,
-    index: TriangleIndex,
-    /// From where the organ is looked at first.
-    pub eye: Vec3,
-}
-
-impl Surface {
-    /// The surface of a mesh at a place, looked at from somewhere.
-    pub fn new(mesh: &Mesh, place: &Transform, eye: Vec3) -> Result<Self> {
-        let mesh = read_mesh(mesh)?;
-        let positions = mesh.positions().iter().map(|&at| place.transform_point(at)).collect();
-        let mesh = TriangleMesh::new(positions, mesh.triangles().to_vec(), None)?;
-        Ok(Self { index: TriangleIndex::new(&mesh), mesh, eye })
-    }
-
-    /// Where a way first meets the surface, and the normal there.
-    pub fn hit(&self, from: Vec3, to: Vec3) -> Option<(Vec3, Vec3)> {
-        let hit = self.index.first_hit(from, to)?;
-        Some((hit.position, self.mesh.triangle_normal(hit.triangle)))
-    }
-
-    /// The nearest point of the surface, and the normal there.
-    pub fn nearest(&self, point: Vec3) -> Option<(Vec3, Vec3)> {
-        let near = self.index.closest(point)?;
-        Some((near.position, self.mesh.triangle_normal(near.triangle)))
-    }
-}
-
 /// The scalpel's edge when it is held along a direction and touches a point: from just outside to a set depth.
 fn edge(touch: Vec3, along: Vec3) -> [Vec3; 2] {
     [touch - ABOVE * along, touch + DEPTH * along]
 }
 
 /// Draws the scalpel from one touch of the surface to the next. An edge that has not moved cuts nothing.
-pub fn draw_scalpel(vessels: &mut CuttableVessels, [before, now]: [[Vec3; 2]; 2]) -> Result<(), BladeError> {
+pub fn draw_scalpel(mut stroke: Stroke, [before, now]: [[Vec3; 2]; 2]) -> Result<(), BladeError> {
     match Blade::sweep(edge(before[0], before[1]), edge(now[0], now[1])) {
-        Ok(blade) => vessels.cut(blade),
+        Ok(blade) => stroke.cut(blade),
         Err(BladeError::NoArea { .. }) => {}
         Err(error) => return Err(error),
     }
@@ -83,8 +49,8 @@ pub fn draw_scalpel(vessels: &mut CuttableVessels, [before, now]: [[Vec3; 2]; 2]
 }
 
 /// Touches a point with the cautery.
-pub fn cauterise(vessels: &mut CuttableVessels, touch: Vec3) -> Result<(), BladeError> {
-    vessels.cauterise(Blade::ball(touch, CAUTERY_RADIUS)?, SEALED_CALIBRE);
+pub fn cauterise(mut stroke: Stroke, touch: Vec3) -> Result<(), BladeError> {
+    stroke.cauterise(Blade::ball(touch, CAUTERY_RADIUS)?, SEALED_CALIBRE);
     Ok(())
 }
 
@@ -100,20 +66,26 @@ fn aim(window: &Window, camera: (&Camera, &GlobalTransform), surface: &Surface) 
     Some([touch, *ray.direction])
 }
 
-/// Dragging with the right button cuts, from where the cursor was in the last frame to where it is.
+/// Dragging with the right button cuts, from where the cursor was in the last frame to where it is. One drag is one stroke,
+/// also where it leaves the organ in between.
 fn slash(
     buttons: Res<ButtonInput<MouseButton>>,
     window: Single<&Window>,
     camera: Single<(&Camera, &GlobalTransform, &mut PanOrbitCamera)>,
     surface: Res<Surface>,
     mut vessels: ResMut<CuttableVessels>,
-    mut last: Local<Option<[Vec3; 2]>>,
+    mut drag: Local<Option<(StrokeId, Option<[Vec3; 2]>)>>,
 ) -> Result {
     let (view, place, mut orbit) = camera.into_inner();
     orbit.button_pan = MouseButton::Middle;
-    let now = aim(&window, (view, place), &surface).filter(|_| buttons.pressed(MouseButton::Right));
+    if !buttons.pressed(MouseButton::Right) {
+        *drag = None;
+        return Ok(());
+    }
+    let (stroke, last) = drag.get_or_insert_with(|| (StrokeId::begin(), None));
+    let now = aim(&window, (view, place), &surface);
     if let (Some(before), Some(now)) = (*last, now) {
-        draw_scalpel(&mut vessels, [before, now])?;
+        draw_scalpel(vessels.in_stroke(*stroke), [before, now])?;
     }
     *last = now;
     Ok(())
@@ -127,12 +99,16 @@ fn operate(
     surface: Res<Surface>,
     mut vessels: ResMut<CuttableVessels>,
     mut organs: Query<&mut Perfusion>,
+    mut cautery: Local<Option<StrokeId>>,
 ) -> Result {
     if keys.just_pressed(KeyCode::KeyZ) {
         vessels.undo();
     }
     if keys.just_pressed(KeyCode::Space) {
         organs.iter_mut().for_each(|mut organ| organ.paused = !organ.paused);
+    }
+    if !keys.pressed(KeyCode::KeyB) {
+        *cautery = None;
     }
     let Some([touch, _]) = aim(&window, *camera, &surface) else { return Ok(()) };
     if keys.just_pressed(KeyCode::KeyK) {
@@ -142,7 +118,8 @@ fn operate(
         vessels.unclamp_near(touch, REACH);
     }
     if keys.pressed(KeyCode::KeyB) {
-        cauterise(&mut vessels, touch)?;
+        let stroke = cautery.get_or_insert_with(StrokeId::begin);
+        cauterise(vessels.in_stroke(*stroke), touch)?;
     }
     Ok(())
 }

@@ -6,11 +6,12 @@ use crate::{
         studio::{StudioArgs, View},
     },
     figures::{Figures, Reading},
-    instruments::{Surface, cauterise, clamp, draw_scalpel},
+    instruments::{cauterise, clamp, draw_scalpel},
+    surface::Surface,
 };
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_vessels::{
-    plugin::{CirculationState, CuttableVessels, OrganSupply, VesselSystems},
+    plugin::{CirculationState, CuttableVessels, OrganSupply, StrokeId, VesselSystems},
     prelude::*,
     synthesis::{
         io::write_atomically,
@@ -70,6 +71,8 @@ struct Operation {
     time: f64,
     pictures: usize,
     table: Vec<(f64, Reading)>,
+    /// The scalpel's, once it is on.
+    stroke: Option<StrokeId>,
     is_over: bool,
 }
 
@@ -153,15 +156,17 @@ fn operate(
     let is_due = |at: f64| before < at && at <= now;
     let share = |at: f64| ((at - CUT[0]) / (CUT[1] - CUT[0])).clamp(0.0, 1.0) as f32;
     if share(before) < share(now) {
-        draw_scalpel(&mut vessels, [before, now].map(|at| site.scalpel(share(at), &surface)))?;
+        let stroke = *operation.stroke.get_or_insert_with(StrokeId::begin);
+        draw_scalpel(vessels.in_stroke(stroke), [before, now].map(|at| site.scalpel(share(at), &surface)))?;
     }
     if is_due(CLAMP) {
         clamp(&mut vessels, site.upstream);
         looks.iter_mut().for_each(|mut look| look.coloring = SegmentColoring::Supply);
     }
     if is_due(CAUTERY) {
+        let stroke = StrokeId::begin();
         for step in 0..=8 {
-            cauterise(&mut vessels, site.scalpel(step as f32 / 8.0, &surface)[0])?;
+            cauterise(vessels.in_stroke(stroke), site.scalpel(step as f32 / 8.0, &surface)[0])?;
         }
     }
     if let Some(&(_, file)) = PICTURES.get(operation.pictures).filter(|(at, _)| *at <= now) {

@@ -1,15 +1,23 @@
-//! Which vessels the command line asks for.
+//! Which organ, with which vessels, the command line asks for.
 
+use crate::common::studio::StudioArgs;
 use bevy::prelude::*;
 use bevy_vessels::{
     prelude::*,
     synthesis::{organ::RootSites, tree::System},
 };
 use clap::{Args, ValueEnum};
+use std::path::PathBuf;
 
-/// Preset, seed and tissue.
+/// What examples with one organ understand.
 #[derive(Args, Clone, Debug)]
-pub struct WishArgs {
+pub struct OrganArgs {
+    /// How it is looked at.
+    #[command(flatten)]
+    pub studio: StudioArgs,
+    /// Take the organ in this glTF file instead of a procedural colon.
+    #[arg(long)]
+    pub mesh: Option<PathBuf>,
     /// Which organ, where it is procedural, and which of the networks that the preset can give.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -32,7 +40,10 @@ pub enum Mode {
     Staged,
 }
 
-impl WishArgs {
+impl OrganArgs {
+    /// Tint of organs that have no colours of their own.
+    pub const FLESH: Color = Color::srgb(0.74, 0.42, 0.37);
+
     /// The vessels, with their radii multiplied so that they show from afar, or are fine from near.
     pub fn vessels(&self, roots: Option<&RootSites>, radii: f32) -> Vasculature {
         let mut wish = Vasculature::new(self.preset).with_seed(self.seed);

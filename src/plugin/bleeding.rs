@@ -138,14 +138,18 @@ fn tell(
 ) {
     let entity = |end: &FlowingEnd| found.entities.and_then(|entities| entities.get(end.id));
     for change in bleeding.changes() {
-        let is_it = |end: &&FlowingEnd| (end.node, end.side) == (change.node, change.side);
+        // Both lists are in the order of the network's ends.
+        let find = |ends: &[FlowingEnd]| {
+            let found = ends.binary_search_by_key(&(change.node, change.side), |end| (end.node, end.side));
+            found.ok().map(|index| ends[index])
+        };
         let vessels = found.entity;
         if !change.bleeds {
-            if let Some(end) = before.iter().find(is_it) {
-                let entity = entity(end);
+            if let Some(end) = find(before) {
+                let entity = entity(&end);
                 messages.stopped.write(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity });
             }
-        } else if let Some((end, entity)) = now.iter().find(is_it).and_then(|end| Some((end, entity(end)?))) {
+        } else if let Some((end, entity)) = find(now).and_then(|end| Some((end, entity(&end)?))) {
             messages.started.write(BleedingStarted { organ, vessels, end: end.id, side: end.side, entity });
         }
     }

@@ -6,7 +6,10 @@
 //! changed.
 
 use crate::plugin::{
-    operations::{OperationError, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite},
+    journal::Journal,
+    operations::{
+        OperationError, StrokeId, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,
+    },
     theatre::Theatre,
 };
 use crate::synthesis::{
@@ -46,8 +49,7 @@ use bevy::{
 #[derive(Resource, Debug, Default)]
 pub struct CuttableVessels {
     queue: Vec<VesselCommand>,
-    /// The vessel entities that each action changed, for those that can be undone.
-    journal: Vec<Vec<Entity>>,
+    journal: Journal,
     /// Organs whose transform has been complained of.
     warned: Vec<Entity>,
 }
@@ -99,7 +101,36 @@ impl CuttableVessels {
         self.request(VesselCommand::new(VesselAction::Cauterise { volume, max_calibre }));
     }
 
-    /// Undoes the last action that changed anything, on all the vessels that it changed.
+    /// What is asked for through this is part of a stroke: the sweeps of many frames, which [`undo`](Self::undo) takes
+    /// back at once.
+    ///
+    /// ```
+    /// # use bevy_vessels::{plugin::{CuttableVessels, StrokeId}, synthesis::wound::Blade};
+    /// # use bevy::prelude::{ButtonInput, Local, MouseButton, Res, ResMut, Vec3};
+    /// # fn edge_now() -> [Vec3; 2] { [Vec3::ZERO, Vec3::Y] }
+    /// fn scalpel(
+    ///     buttons: Res<ButtonInput<MouseButton>>,
+    ///     mut stroke: Local<Option<(StrokeId, [Vec3; 2])>>,
+    ///     mut vessels: ResMut<CuttableVessels>,
+    /// ) {
+    ///     let now = edge_now();
+    ///     *stroke = buttons.pressed(MouseButton::Left).then(|| {
+    ///         let (id, before) = stroke.unwrap_or_else(|| (StrokeId::begin(), now));
+    ///         // an edge that stands still sweeps no area
+    ///         if let Ok(blade) = Blade::sweep(before, now) {
+    ///             vessels.in_stroke(id).cut(blade);
+    ///         }
+    ///         (id, now)
+    ///     });
+    /// }
+    /// # bevy::ecs::system::assert_is_system(scalpel);
+    /// ```
+    pub fn in_stroke(&mut self, stroke: StrokeId) -> Stroke<'_> {
+        Stroke { vessels: self, stroke }
+    }
+
+    /// Undoes the last action or stroke that changed anything, on all the vessels that it changed. Of those that went on at
+    /// once, it is the one that began last.
     ///
     /// Blood that was lost stays lost.
     pub fn undo(&mut self) {
@@ -118,8 +149,7 @@ impl CuttableVessels {
 
     /// Strikes a vessel entity, whose ledger has been cleared, from what can be undone.
     pub(crate) fn forget(&mut self, vessels: Entity) {
-        self.journal.iter_mut().for_each(|changed| changed.retain(|&entity| entity != vessels));
-        self.journal.retain(|changed| !changed.is_empty());
+        self.journal.forget(|entity| entity == vessels);
     }
 
     /// Says what could not be done: in the log where that is news to whoever made the app.
@@ -135,9 +165,34 @@ impl CuttableVessels {
         }
     }
 
-    /// Number of actions that can be undone.
+    /// Number of actions that can be undone; a stroke is one.
     pub fn actions(&self) -> usize {
         self.journal.len()
+    }
+}
+
+/// The door, for what is part of a stroke: see [`CuttableVessels::in_stroke`]. Other actions go through
+/// [`request`](Self::request).
+#[derive(Debug)]
+pub struct Stroke<'a> {
+    vessels: &'a mut CuttableVessels,
+    stroke: StrokeId,
+}
+
+impl Stroke<'_> {
+    /// As [`CuttableVessels::cut`].
+    pub fn cut(&mut self, blade: Blade) {
+        self.request(VesselCommand::new(VesselAction::Cut(blade)));
+    }
+
+    /// As [`CuttableVessels::cauterise`].
+    pub fn cauterise(&mut self, volume: Blade, max_calibre: f32) {
+        self.request(VesselCommand::new(VesselAction::Cauterise { volume, max_calibre }));
+    }
+
+    /// Asks for any action as part of the stroke. Undoing is part of none.
+    pub fn request(&mut self, command: VesselCommand) {
+        self.vessels.request(command.in_stroke(self.stroke));
     }
 }
 

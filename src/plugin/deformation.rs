@@ -1,41 +1,33 @@
-//! Vessels follow an organ whose mesh is deformed.
+//! Vessels follow an organ that is deformed: its mesh, or the tetrahedra of its inside.
 //!
-//! In: the organ's mesh asset, whose positions someone writes. Out: [`Vessels`] with moved nodes. Growth goes on at rest:
-//! what grows is bound to the organ as it was when its tissue was prepared, and moved from there.
+//! In: the organ's mesh asset or its [`FollowsTetrahedra`], whose positions someone writes. Out: [`Vessels`] with moved
+//! nodes. Growth goes on at rest: what grows is bound to the organ as it was then, and moved from there.
 
 use crate::plugin::{
-    circulation::AT_ONCE,
+    bound_vessels::{Bound, Motion, RestOrgan, VesselBinding},
     components::{GrowthProgress, OrganVessels},
     growth_state::GrowthState,
     organ_mesh::{MeshCopy, copy_mesh, vertex_positions},
-    segment_changes::SegmentChanges,
-    vessel_index::VesselIndex,
     vessels::{Lineage, Vessels},
 };
-use crate::synthesis::{
-    binding::{Binding, BindingError},
-    mesh::{MeshError, TriangleMesh},
-    tree::VesselTree,
-};
+use crate::synthesis::binding::TetMesh;
 use bevy::{
     asset::Assets,
-    camera::primitives::Aabb,
     ecs::{
         change_detection::{DetectChanges, DetectChangesMut, Res},
         component::Component,
         entity::Entity,
         lifecycle::Remove,
         observer::On,
-        query::{QueryData, With, Without},
+        query::{Has, Or, QueryData, With, Without},
         reflect::ReflectComponent,
         system::{Commands, Query},
-        world::EntityWorldMut,
+        world::{EntityWorldMut, Ref},
     },
     log::warn,
     math::Vec3,
     mesh::{Mesh, Mesh3d},
     reflect::{Reflect, std_traits::ReflectDefault},
-    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
 };
 use std::sync::Arc;
 
@@ -55,7 +47,69 @@ use std::sync::Arc;
 #[require(RestMesh)]
 pub struct FollowsMesh;
 
-/// An organ's mesh at rest. The plugin keeps it for organs with [`FollowsMesh`].
+/// Lets an organ's vessels follow tetrahedra that fill it, as a soft body has them: put it beside the organ's
+/// [`Vasculature`](crate::plugin::Vasculature), and write [`positions_mut`](Self::positions_mut) each frame.
+///
+/// Vessels inside a solid organ move with the tissue around them, where [`FollowsMesh`] knows its surface alone. Each node
+/// follows the tetrahedron that holds it: exactly, where that is stretched and sheared. Nodes outside all of them, such as
+/// those of vessels that stand off the surface, follow the nearest.
+///
+/// All positions are in the local space of the organ's mesh, and [`rest`](Self::rest) is the organ in which vessels grow.
+/// The mesh may be deformed as well, by whoever draws it: as with [`FollowsMesh`], that doesn't start the growth again. An
+/// organ with both follows the tetrahedra. To change the tetrahedra themselves, after a remeshing for example, insert
+/// another one of these, with the tetrahedra as they lie in the organ at rest.
+///
+/// Written before [`VesselSystems::Publish`](crate::plugin::VesselSystems::Publish), vessels follow in the same frame. Radii,
+/// flow and what is ischaemic stay as they are at rest. Removing this brings the vessels back to rest.
+///
+/// ```
+/// # use bevy_vessels::{plugin::FollowsTetrahedra, synthesis::binding::{TetMesh, TetMeshError}};
+/// # use bevy::prelude::{Query, Vec3};
+/// fn tetrahedra() -> Result<FollowsTetrahedra, TetMeshError> {
+///     let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+///     Ok(FollowsTetrahedra::new(TetMesh::new(corners, vec![[0, 1, 2, 3]])?))
+/// }
+///
+/// fn sag(mut organs: Query<&mut FollowsTetrahedra>) {
+///     for mut organ in &mut organs {
+///         organ.positions_mut().iter_mut().for_each(|at| at.y -= 0.001);
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(sag);
+/// # assert!(tetrahedra().is_ok());
+/// ```
+#[derive(Component, Clone, Debug)]
+#[require(RestMesh)]
+pub struct FollowsTetrahedra {
+    rest: Arc<TetMesh>,
+    lineage: Lineage,
+    positions: Vec<Vec3>,
+}
+
+impl FollowsTetrahedra {
+    /// Tetrahedra that are at rest. [`TetMesh::new`] says what is wrong with those that can't be followed.
+    pub fn new(rest: impl Into<Arc<TetMesh>>) -> Self {
+        let rest = rest.into();
+        Self { lineage: Lineage::new_one(), positions: rest.positions().to_vec(), rest }
+    }
+
+    /// The tetrahedra at rest.
+    pub fn rest(&self) -> &TetMesh {
+        &self.rest
+    }
+
+    /// Where the vertices of the tetrahedra are.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The same, to be written. Where one isn't finite nothing moves, and the log says so once.
+    pub fn positions_mut(&mut self) -> &mut [Vec3] {
+        &mut self.positions
+    }
+}
+
+/// An organ's mesh at rest. The plugin keeps it for organs with [`FollowsMesh`] or [`FollowsTetrahedra`].
 #[derive(Component, Clone, Default)]
 pub struct RestMesh {
     copy: Option<Arc<MeshCopy>>,
@@ -81,32 +135,18 @@ impl RestMesh {
 
     fn warn(&mut self, organ: Entity, what: &str) {
         if !std::mem::replace(&mut self.warned, true) {
-            warn!("{organ}: its vessels don't follow its mesh: {what}");
+            warn!("{organ}: its vessels don't follow it: {what}");
         }
     }
 }
 
-/// The nodes of a vessel entity, bound to their organ at rest.
-#[derive(Component, Debug, Default)]
-pub(crate) struct VesselBinding {
-    binding: Option<Binding>,
-    task: Option<Task<Result<Binding, MeshError>>>,
-    /// What it was made for.
-    made_for: Option<MadeFor>,
-}
-
-/// What a binding is made for. Nodes shift a little while they grow, so grown ones are bound again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct MadeFor {
-    vessels: Lineage,
-    tissue: Lineage,
-    is_grown: bool,
-}
+/// Organs whose vessels follow them.
+type Deforming = Or<(With<FollowsMesh>, With<FollowsTetrahedra>)>;
 
 /// Source: an organ is at rest as it is when its tissue is prepared.
 pub(crate) fn take_rest(
     meshes: Res<Assets<Mesh>>,
-    mut organs: Query<(Entity, &Mesh3d, Option<&GrowthState>, &mut RestMesh), With<FollowsMesh>>,
+    mut organs: Query<(Entity, &Mesh3d, Option<&GrowthState>, &mut RestMesh), Deforming>,
 ) {
     for (organ, mesh, growth, mut rest) in &mut organs {
         let tissue = growth.map(GrowthState::tissue_lineage).unwrap_or_default();
@@ -124,7 +164,7 @@ pub(crate) fn take_rest(
 /// Publish: gives a binding to the vessels of organs that are followed.
 pub(crate) fn attach_bindings(
     mut commands: Commands,
-    organs: Query<&OrganVessels, With<FollowsMesh>>,
+    organs: Query<&OrganVessels, Deforming>,
     unbound: Query<(), (With<Vessels>, Without<VesselBinding>)>,
 ) {
     for &vessels in organs.iter().flat_map(|vessels| vessels.entities()).filter(|&&entity| unbound.contains(entity)) {
@@ -132,10 +172,10 @@ pub(crate) fn attach_bindings(
     }
 }
 
-/// An organ that is followed.
+/// An organ whose mesh is followed.
 #[derive(QueryData)]
 #[query_data(mutable)]
-pub(crate) struct Followed {
+pub(crate) struct FollowedMesh {
     entity: Entity,
     mesh: &'static Mesh3d,
     progress: Option<&'static GrowthProgress>,
@@ -143,50 +183,37 @@ pub(crate) struct Followed {
     rest: &'static mut RestMesh,
 }
 
-/// Vessels that follow.
-#[derive(QueryData)]
-#[query_data(mutable)]
-pub(crate) struct Bound {
-    vessels: &'static mut Vessels,
-    binding: &'static mut VesselBinding,
-    changes: &'static mut SegmentChanges,
-    aabb: Option<&'static mut Aabb>,
-    index: Option<&'static mut VesselIndex>,
-}
-
 /// Publish: vessels go where their organ's mesh is.
 pub(crate) fn follow_meshes(
     meshes: Option<Res<Assets<Mesh>>>,
-    mut organs: Query<Followed, With<FollowsMesh>>,
+    mut organs: Query<FollowedMesh, (With<FollowsMesh>, Without<FollowsTetrahedra>)>,
     mut bound: Query<Bound>,
 ) {
     let Some(meshes) = meshes else { return };
     for mut organ in &mut organs {
         let (Some(mesh), Some(copy)) = (meshes.get(organ.mesh.id()), organ.rest.copy.clone()) else { continue };
         let Some(vertices) = vertex_positions(mesh) else {
-            organ.rest.warn(organ.entity, "its positions are not in main memory as three floats each");
+            organ.rest.warn(organ.entity, "its mesh's positions are not in main memory as three floats each");
             continue;
         };
         if vertices.len() != copy.positions.len() {
             // The tissue of a mesh that is another one is being prepared; vessels that did not grow have none.
             if organ.progress.is_none() {
-                organ.rest.warn(organ.entity, "it has another number of vertices than it had at rest");
+                organ.rest.warn(organ.entity, "its mesh has another number of vertices than it had at rest");
             }
             continue;
         }
-        let moved = organ.rest.bypass_change_detection().take_vertices(vertices);
+        let has_moved = organ.rest.bypass_change_detection().take_vertices(vertices);
         let is_at_rest = organ.rest.followed == copy.positions;
-        let is_grown = organ.progress.is_none_or(GrowthProgress::is_finished);
-        let mut each = bound.iter_many_mut(organ.vessels.entities());
-        while let Some(mut vessels) = each.fetch_next() {
-            let made_for = MadeFor { vessels: vessels.vessels.lineage(), tissue: organ.rest.tissue, is_grown };
-            let is_new = vessels.bind(made_for, &copy);
-            if moved || is_new || vessels.vessels.is_changed() {
-                let followed = if is_at_rest { None } else { Some(&organ.rest.followed[..]) };
-                if let Err(error) = vessels.follow(followed) {
-                    organ.rest.bypass_change_detection().warn(organ.entity, &error.to_string());
-                }
-            }
+        let motion = Motion {
+            rest: RestOrgan::Surface(copy),
+            lineage: organ.rest.tissue,
+            is_grown: organ.progress.is_none_or(GrowthProgress::is_finished),
+            has_moved,
+            vertices: if is_at_rest { None } else { Some(&organ.rest.followed) },
+        };
+        if let Err(error) = motion.carry_along(organ.vessels.entities(), &mut bound) {
+            organ.rest.bypass_change_detection().warn(organ.entity, &error.to_string());
         }
     }
 }
@@ -204,85 +231,54 @@ impl RestMesh {
     }
 }
 
-impl BoundItem<'_, '_> {
-    /// Binds the vessels to the organ at rest where that is due: at once where it is quick. Says whether there is a new
-    /// binding.
-    fn bind(&mut self, made_for: MadeFor, rest: &Arc<MeshCopy>) -> bool {
-        let binding = &mut *self.binding;
-        if binding.made_for != Some(made_for) && !self.vessels.tree().is_empty() {
-            let is_other = binding
-                .made_for
-                .is_none_or(|before| (before.vessels, before.tissue) != (made_for.vessels, made_for.tissue));
-            if is_other {
-                binding.binding = None;
-            }
-            binding.made_for = Some(made_for);
-            let (tree, rest) = (self.vessels.tree_at_rest().into_owned(), Arc::clone(rest));
-            let work = tree.len() + rest.triangles.len();
-            let bind = move || bind_to(&tree, &rest);
-            if work > AT_ONCE {
-                let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
-                binding.task = Some(pool.spawn(async move { bind() }));
-            } else {
-                binding.task = None;
-                binding.binding = bind().ok();
-                return true;
-            }
-        }
-        let Some(bound) = binding.task.as_mut().and_then(check_ready) else { return false };
-        binding.task = None;
-        // The tissue was prepared from the same triangles, which were checked then.
-        binding.binding = bound.ok();
-        true
-    }
+/// An organ whose tetrahedra are followed.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct FollowedTetrahedra {
+    entity: Entity,
+    tetrahedra: Ref<'static, FollowsTetrahedra>,
+    progress: Option<&'static GrowthProgress>,
+    vessels: &'static OrganVessels,
+    rest: &'static mut RestMesh,
+}
 
-    /// Moves the vessels with the vertices; `None` for back to rest.
-    fn follow(&mut self, vertices: Option<&[Vec3]>) -> Result<(), BindingError> {
-        let moved = match (vertices, &mut self.binding.binding) {
-            (None, _) => self.vessels.bypass_change_detection().come_to_rest(),
-            (Some(vertices), Some(binding)) => {
-                self.vessels.bypass_change_detection().deform(binding, vertices)?;
-                true
-            }
-            (Some(_), None) => false,
+/// Publish: vessels go where their organ's tetrahedra are.
+pub(crate) fn follow_tetrahedra(mut organs: Query<FollowedTetrahedra>, mut bound: Query<Bound>) {
+    for mut organ in &mut organs {
+        let tetrahedra = &organ.tetrahedra;
+        let is_at_rest = tetrahedra.positions == tetrahedra.rest.positions();
+        let motion = Motion {
+            rest: RestOrgan::Solid(Arc::clone(&tetrahedra.rest)),
+            lineage: tetrahedra.lineage,
+            is_grown: organ.progress.is_none_or(GrowthProgress::is_finished),
+            has_moved: tetrahedra.is_changed(),
+            vertices: if is_at_rest { None } else { Some(&tetrahedra.positions) },
         };
-        if moved {
-            self.vessels.set_changed();
-            self.changes.mark_all();
-            if let Some(aabb) = &mut self.aabb {
-                let now = self.vessels.aabb();
-                aabb.set_if_neq(now);
-            }
-            if let Some(index) = &mut self.index {
-                index.note_moved(&self.vessels, None);
-            }
+        if let Err(error) = motion.carry_along(organ.vessels.entities(), &mut bound) {
+            organ.rest.bypass_change_detection().warn(organ.entity, &error.to_string());
         }
-        Ok(())
     }
 }
 
-fn bind_to(tree: &VesselTree, rest: &MeshCopy) -> Result<Binding, MeshError> {
-    let mesh = TriangleMesh::new(rest.positions.clone(), rest.triangles.clone(), None)?;
-    Ok(Binding::to_surface(tree, &mesh))
-}
-
-/// Vessels that no longer follow come to rest.
-pub(crate) fn release_vessels(
-    removed: On<Remove, FollowsMesh>,
-    organs: Query<&OrganVessels>,
+/// Vessels that no longer follow come to rest, unless there is another way in which they follow.
+pub(crate) fn release_vessels<Followed: Component, Other: Component>(
+    removed: On<Remove, Followed>,
+    organs: Query<(Option<&OrganVessels>, Has<Other>)>,
     mut vessels: Query<Bound>,
     mut commands: Commands,
 ) {
-    let entities = organs.get(removed.entity).map_or(&[][..], OrganVessels::entities);
+    let Ok((entities, follows_otherwise)) = organs.get(removed.entity) else { return };
+    let entities = entities.map_or(&[][..], OrganVessels::entities);
     let mut each = vessels.iter_many_mut(entities);
     while let Some(mut bound) = each.fetch_next() {
-        // Coming to rest needs no binding, and cannot fail.
-        let _ = bound.follow(None);
+        bound.come_to_rest();
     }
     for &entity in entities {
         commands.entity(entity).try_remove::<VesselBinding>();
     }
-    commands.entity(removed.entity).queue_silenced(|mut organ: EntityWorldMut| {
-        organ.remove::<RestMesh>();
-    });
+    if !follows_otherwise {
+        commands.entity(removed.entity).queue_silenced(|mut organ: EntityWorldMut| {
+            organ.remove::<RestMesh>();
+        });
+    }
 }

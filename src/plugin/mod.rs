@@ -4,7 +4,8 @@
 //! tree in [`Vessels`] and what changed in [`SegmentChanges`]; the state of things in [`GrowthProgress`] and messages.
 //!
 //! What goes beyond growth is asked for by components on the organ: [`Cuttable`] for surgery through [`CuttableVessels`],
-//! [`Perfusion`] for blood, [`FollowsMesh`] for soft bodies. An organ without them pays nothing for them.
+//! [`Perfusion`] for blood, [`FollowsMesh`] or [`FollowsTetrahedra`] for soft bodies. An organ without them pays nothing
+//! for them.
 //!
 //! ```text
 //! Source      commands, wishes, mesh assets ─► tissue (in the task pool) ─► growth, started
@@ -15,6 +16,7 @@
 //! ```
 
 mod bleeding;
+mod bound_vessels;
 mod circulation;
 mod commands;
 mod components;
@@ -23,6 +25,7 @@ mod deformation;
 pub mod diagnostics;
 mod growth;
 mod growth_state;
+mod journal;
 mod messages;
 mod open_ends;
 mod operations;
@@ -46,14 +49,15 @@ pub use components::{
     GrowthControl, GrowthPhase, GrowthProgress, OrganVessels, SegmentColoring, Vasculature, VesselAppearance,
     VesselSystem, VesselsOf,
 };
-pub use cutting::CuttableVessels;
-pub use deformation::{FollowsMesh, RestMesh};
+pub use cutting::{CuttableVessels, Stroke};
+pub use deformation::{FollowsMesh, FollowsTetrahedra, RestMesh};
 pub use growth::{GrowthBudget, GrowthFrame};
 pub use growth_state::GrowthState;
 pub use messages::{GrowthAction, GrowthCommand, GrowthFailed, GrowthFinished, GrowthStarted, OrganError};
 pub use open_ends::{OpenEnd, OpenEndEntities};
 pub use operations::{
-    OperationError, OperationKind, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,
+    OperationError, OperationKind, StrokeId, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed,
+    VesselSite,
 };
 pub use organ_mesh::{OrganMeshError, read_mesh};
 pub use perfusion::{
@@ -155,7 +159,8 @@ fn add_observers(app: &mut App) {
         .add_observer(wounds::remove_wounds)
         .add_observer(wounds::forget_ledger)
         .add_observer(circulation::remove_circulation)
-        .add_observer(deformation::release_vessels);
+        .add_observer(deformation::release_vessels::<FollowsMesh, FollowsTetrahedra>)
+        .add_observer(deformation::release_vessels::<FollowsTetrahedra, FollowsMesh>);
 }
 
 fn add_growth_systems(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
@@ -200,7 +205,7 @@ fn add_publish_systems(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
         wounds::clear_outdated,
         open_ends::spawn_open_ends,
         deformation::attach_bindings,
-        deformation::follow_meshes,
+        (deformation::follow_meshes, deformation::follow_tetrahedra).chain(),
         open_ends::move_open_ends,
         publish::show_systems,
         diagnostics::measure,

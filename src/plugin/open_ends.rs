@@ -18,16 +18,17 @@ use bevy::{
     ecs::{
         component::Component,
         entity::Entity,
-        hierarchy::ChildOf,
+        hierarchy::{ChildOf, Children},
         query::{Changed, Or},
         reflect::ReflectComponent,
         system::{Commands, Query},
+        world::EntityWorldMut,
     },
     math::Vec3,
     reflect::Reflect,
     transform::components::Transform,
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// An open end of a severed vessel. For reading: the plugin writes it.
 ///
@@ -154,7 +155,23 @@ pub(crate) fn spawn_open_ends(
             });
             entities.0.insert(end.id, spawned);
         }
-        before.into_values().for_each(|closed| commands.entity(closed).try_despawn());
+        if !before.is_empty() {
+            let closed = before.into_values().collect();
+            commands.entity(entity).queue_silenced(|vessels: EntityWorldMut| despawn_children(vessels, closed));
+        }
+    }
+}
+
+/// Despawns many children at once: one by one, each would be looked for among all of them.
+pub(crate) fn despawn_children(mut parent: EntityWorldMut, unwanted: Vec<Entity>) {
+    let unwanted: BTreeSet<Entity> = unwanted.into_iter().collect();
+    let children = parent.get::<Children>().into_iter().flatten().copied();
+    let (gone, kept): (Vec<Entity>, Vec<Entity>) = children.partition(|child| unwanted.contains(child));
+    parent.replace_related_with_difference::<ChildOf>(&gone, &kept, &[]);
+    let world = parent.into_world_mut();
+    // Those that someone has given another parent, too.
+    for child in unwanted {
+        world.try_despawn(child).ok();
     }
 }
 

@@ -8,6 +8,7 @@ use bevy::{
     ecs::{entity::Entity, message::Message},
     math::Vec3,
 };
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Asks for something to be done to vessels: the same as [`CuttableVessels`](crate::plugin::CuttableVessels), as a
 /// message. Carried out in the same frame or the next.
@@ -25,6 +26,8 @@ use bevy::{
 pub struct VesselCommand {
     /// The organ that it is meant for; `None` for all that it meets.
     pub organ: Option<Entity>,
+    /// The stroke that it is part of; `None` for an action by itself.
+    pub stroke: Option<StrokeId>,
     /// What is to be done.
     pub action: VesselAction,
 }
@@ -32,13 +35,39 @@ pub struct VesselCommand {
 impl VesselCommand {
     /// A command for all organs with a [`Cuttable`](crate::plugin::Cuttable).
     pub fn new(action: VesselAction) -> Self {
-        Self { organ: None, action }
+        Self { organ: None, stroke: None, action }
     }
 
     /// The same for one organ.
     #[must_use]
     pub fn on(self, organ: Entity) -> Self {
         Self { organ: Some(organ), ..self }
+    }
+
+    /// The same as part of a stroke.
+    #[must_use]
+    pub fn in_stroke(self, stroke: StrokeId) -> Self {
+        Self { stroke: Some(stroke), ..self }
+    }
+}
+
+/// One movement of an instrument, over as many frames as it takes: what the user takes for one action, and undo takes back
+/// as one.
+///
+/// Begin one when the instrument goes on, and give it to each of the sweeps that follow: by [`VesselCommand::in_stroke`] or
+/// [`CuttableVessels::in_stroke`](crate::plugin::CuttableVessels::in_stroke). It ends when it is used no more. Several may
+/// go on at once, such as those of two hands.
+///
+/// What is done between two actions of a stroke, and to the same vessels, is undone together with it: a stroke that went on
+/// over it can't be taken back from under it. After an undo the stroke may go on, as one that has just begun.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct StrokeId(u64);
+
+impl StrokeId {
+    /// A stroke that nothing belongs to yet.
+    pub fn begin() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
     }
 }
 
@@ -74,7 +103,8 @@ pub enum VesselAction {
         /// How far from it a clamp may be.
         reach: f32,
     },
-    /// Undoes the last action that changed anything, wherever it did; for one organ, the last that changed that, there.
+    /// Undoes the last action or stroke that changed anything, wherever it did; for one organ, the last that changed that,
+    /// there.
     Undo,
     /// Undoes all actions.
     UndoAll,
@@ -112,7 +142,7 @@ pub enum OperationKind {
     Ligated,
     /// A clamp was taken off.
     Unclamped,
-    /// One or more actions were undone.
+    /// An action, a stroke or everything was undone.
     Undone,
 }
 
@@ -131,6 +161,8 @@ pub struct VesselOperation {
     pub system: System,
     /// What was done.
     pub kind: OperationKind,
+    /// The stroke that it was part of. `None` for an undo.
+    pub stroke: Option<StrokeId>,
     /// What it changed; positions in the space of the organ's mesh. Never empty.
     pub report: WoundReport,
 }

@@ -152,17 +152,49 @@ impl OrganFlow {
         System::ALL.iter().filter_map(|&system| self.networks.get(system)).map(Network::len).sum()
     }
 
-    /// A copy to be measured, at the mean of the pulse and as much pressure as the patient has left.
-    pub(crate) fn at_mean_pressure(&self, blood: &BloodVolume) -> Result<Self, FlowError> {
-        let mut copy = Self { networks: self.networks.clone(), trees: Arc::clone(&self.trees) };
-        copy.networks.hold_at(blood.pressure_share())?;
-        Ok(copy)
+    /// A copy to measure with.
+    pub(crate) fn copy(&self) -> Self {
+        Self { networks: self.networks.clone(), trees: Arc::clone(&self.trees) }
     }
+
+    /// How the vessels are now, for a copy to be made equal: as much as there are gaps, however many vessels.
+    pub(crate) fn condition(&self, blood: &BloodVolume) -> Condition {
+        let of_systems = System::ALL.map(|system| match self.networks.get(system) {
+            Some(network) => {
+                let openings = network.open_ends().iter().map(|end| end.opening).collect();
+                (network.interruptions().collect(), openings)
+            }
+            None => <(Vec<_>, Vec<_>)>::default(),
+        });
+        Condition { of_systems, pressure_share: blood.pressure_share() }
+    }
+
+    /// Makes this copy equal to the flow that a condition is of, at the mean of the pulse, and solves it altogether.
+    fn solve_in(&mut self, condition: &Condition) -> Result<(), FlowError> {
+        for (system, (gaps, openings)) in System::ALL.into_iter().zip(&condition.of_systems) {
+            let Some(network) = self.networks.get_mut(system) else { continue };
+            network.set_interruptions(gaps)?;
+            openings.iter().enumerate().try_for_each(|(end, &share)| network.set_opening(end, share))?;
+        }
+        self.networks.hold_at(condition.pressure_share)?;
+        self.networks.solve()
+    }
+}
+
+/// What the flow in an organ depends on, its intact vessels aside.
+#[derive(Clone, Debug)]
+pub(crate) struct Condition {
+    /// Gaps of each system, and how far each of its open ends is open.
+    of_systems: [(Vec<(NodeId, Interruption)>, Vec<f64>); 2],
+    /// How much of their pressure the patient's roots have left.
+    pressure_share: f64,
 }
 
 /// What an organ's tissue gets, against the intact organ.
 #[derive(Debug)]
 pub(crate) struct SupplyGauge {
+    /// A copy of its own, so that measuring holds up no frame.
+    flow: OrganFlow,
     of_systems: [Supply; 2],
     tissue: Option<TissueSupply>,
 }
@@ -178,29 +210,23 @@ pub(crate) struct Measured {
 }
 
 impl SupplyGauge {
-    /// Measures from now on against what flows in the intact vessels of `intact`, whose gaps don't count. `vertices` are
+    /// Measures from now on against what flows in the intact vessels of `flow`, whose gaps don't count. `vertices` are
     /// the organ's, at rest.
-    pub(crate) fn new(intact: &OrganFlow, vertices: &[Vec3]) -> Result<Self, FlowError> {
-        let mut networks = intact.networks.clone();
-        for system in System::ALL {
-            if let Some(network) = networks.get_mut(system) {
-                network.set_interruptions(&[])?;
-            }
-        }
-        networks.hold_at(1.0)?;
-        networks.solve()?;
+    pub(crate) fn new(mut flow: OrganFlow, vertices: &[Vec3]) -> Result<Self, FlowError> {
+        flow.solve_in(&Condition { of_systems: Default::default(), pressure_share: 1.0 })?;
         let supply = |system: System| {
-            let (tree, network) = (intact.trees[system.index()].as_ref(), networks.get(system));
+            let (tree, network) = (flow.trees[system.index()].as_ref(), flow.networks.get(system));
             tree.zip(network).map_or_else(Supply::default, |(tree, network)| Supply::against(tree, network))
         };
-        let arteries = intact.trees[System::Arterial.index()].as_ref();
+        let arteries = flow.trees[System::Arterial.index()].as_ref();
         let tissue = arteries.filter(|_| !vertices.is_empty()).map(|tree| TissueSupply::new(tree, vertices));
-        Ok(Self { of_systems: System::ALL.map(supply), tissue })
+        Ok(Self { of_systems: System::ALL.map(supply), tissue, flow })
     }
 
-    /// Solves the flow altogether and measures.
-    pub(crate) fn measure(&mut self, mut flow: OrganFlow, ischaemic_below: f32) -> Result<Measured, FlowError> {
-        flow.networks.solve()?;
+    /// Measures the vessels in a condition.
+    pub(crate) fn measure(&mut self, condition: &Condition, ischaemic_below: f32) -> Result<Measured, FlowError> {
+        let flow = &mut self.flow;
+        flow.solve_in(condition)?;
         let mut share = 0.0;
         for system in System::ALL {
             let supply = &mut self.of_systems[system.index()];

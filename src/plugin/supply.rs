@@ -7,7 +7,7 @@ use crate::plugin::{
     circulation::{AT_ONCE, CirculationState, patient_of},
     components::{OrganVessels, VesselSystem},
     deformation::RestMesh,
-    organ_flow::{Measured, OrganFlow, SupplyGauge},
+    organ_flow::{Condition, Measured, OrganFlow, SupplyGauge},
     organ_mesh::vertex_positions,
     perfusion::{OrganSupply, Patient, Perfusion, SegmentSupply},
 };
@@ -28,13 +28,13 @@ use bevy::{
 };
 
 /// A gauge, with what it has measured.
-type Outcome = Result<(SupplyGauge, Measured), FlowError>;
+type Outcome = Result<(Box<SupplyGauge>, Measured), FlowError>;
 
 /// When the supply of an organ is measured, and with what.
 #[derive(Debug, Default)]
 pub(crate) struct Gauge {
     /// `None` before the first measurement, and while the task has it.
-    gauge: Option<SupplyGauge>,
+    gauge: Option<Box<SupplyGauge>>,
     task: Option<Task<Outcome>>,
     /// Whether the organ's vessels have grown, so that there is something to measure.
     is_ready: bool,
@@ -69,7 +69,7 @@ impl Gauge {
     }
 
     /// Hands out what is measured with, and begins to count anew.
-    fn begin(&mut self) -> Option<SupplyGauge> {
+    fn begin(&mut self) -> Option<Box<SupplyGauge>> {
         let gauge = self.gauge.take();
         *self = Self { is_ready: true, ..Self::default() };
         gauge
@@ -85,19 +85,24 @@ impl Gauge {
 
 /// All that a measurement takes.
 struct Order {
-    flow: OrganFlow,
-    gauge: Option<SupplyGauge>,
-    vertices: Vec<Vec3>,
+    source: Source,
+    condition: Condition,
     ischaemic_below: f32,
+}
+
+/// What is measured with: the first time, it is to be made from a copy of the flow and the organ's vertices.
+enum Source {
+    Gauge(Box<SupplyGauge>),
+    New { flow: OrganFlow, vertices: Vec<Vec3> },
 }
 
 impl Order {
     fn carry_out(self) -> Outcome {
-        let mut gauge = match self.gauge {
-            Some(gauge) => gauge,
-            None => SupplyGauge::new(&self.flow, &self.vertices)?,
+        let mut gauge = match self.source {
+            Source::Gauge(gauge) => gauge,
+            Source::New { flow, vertices } => Box::new(SupplyGauge::new(flow, &vertices)?),
         };
-        let measured = gauge.measure(self.flow, self.ischaemic_below)?;
+        let measured = gauge.measure(&self.condition, self.ischaemic_below)?;
         Ok((gauge, measured))
     }
 }
@@ -145,15 +150,19 @@ impl SuppliedItem<'_, '_> {
     /// Begins a measurement. Gives the outcome of one that was quick.
     fn begin(&mut self, patient: &Patient, meshes: Option<&Assets<Mesh>>) -> Option<Outcome> {
         let state = self.state.bypass_change_detection();
-        let flow = match state.flow()?.at_mean_pressure(&patient.blood) {
-            Ok(flow) => flow,
-            Err(error) => return Some(Err(error)),
-        };
+        let condition = state.flow()?.condition(&patient.blood);
         let gauge = state.gauge.begin();
-        let is_new = gauge.is_none();
-        let vertices = if is_new { self.vertices(meshes) } else { Vec::new() };
-        let work = flow.nodes() + vertices.len();
-        let order = Order { flow, gauge, vertices, ischaemic_below: self.perfusion.ischaemic_below };
+        let flow = state.flow()?;
+        let mut work = flow.nodes();
+        let source = match gauge {
+            Some(gauge) => Source::Gauge(gauge),
+            None => {
+                let (flow, vertices) = (flow.copy(), self.vertices(meshes));
+                work += vertices.len();
+                Source::New { flow, vertices }
+            }
+        };
+        let order = Order { source, condition, ischaemic_below: self.perfusion.ischaemic_below };
         if work <= AT_ONCE {
             return Some(order.carry_out());
         }

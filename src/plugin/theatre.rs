@@ -2,6 +2,7 @@
 
 use crate::plugin::{
     components::{OrganVessels, VesselSystem},
+    journal::Journal,
     operations::{OperationError, OperationKind, VesselAction, VesselCommand, VesselOperation, VesselSite},
     probe::{Near, Touch, mean_scale, nearest_place},
     segment_changes::SegmentChanges,
@@ -71,8 +72,8 @@ type Operations = Result<Vec<VesselOperation>, OperationError>;
 type Report = Result<WoundReport, OperationError>;
 
 impl Theatre<'_, '_> {
-    /// Carries out a command. The journal holds the vessel entities that each action changed.
-    pub(crate) fn carry_out(&mut self, command: &VesselCommand, journal: &mut Vec<Vec<Entity>>) -> Outcome {
+    /// Carries out a command, and takes note of it in the journal.
+    pub(crate) fn carry_out(&mut self, command: &VesselCommand, journal: &mut Journal) -> Outcome {
         let targets = match self.targets(command.organ) {
             Ok(targets) => targets,
             Err(error) => return Err(error).into(),
@@ -82,9 +83,10 @@ impl Theatre<'_, '_> {
             VesselAction::UndoAll => return Ok(self.undo_all(&targets, journal)).into(),
             _ => {}
         }
-        let outcome = self.act(&targets, &command.action);
+        let mut outcome = self.act(&targets, &command.action);
         if !outcome.done.is_empty() {
-            journal.push(outcome.done.iter().map(|operation| operation.vessels).collect());
+            outcome.done.iter_mut().for_each(|operation| operation.stroke = command.stroke);
+            journal.note(command.stroke, outcome.done.iter().map(|operation| operation.vessels));
         }
         outcome
     }
@@ -142,7 +144,7 @@ impl Theatre<'_, '_> {
             return Ok(None);
         }
         found.wounds.note(&report, &mut found.changes);
-        Ok(Some(VesselOperation { organ, vessels: entity, system: found.system.0, kind, report }))
+        Ok(Some(VesselOperation { organ, vessels: entity, system: found.system.0, kind, stroke: None, report }))
     }
 
     fn cut(&mut self, targets: &[Target], blade: &Blade) -> Outcome {
@@ -255,19 +257,20 @@ impl Theatre<'_, '_> {
         best.ok_or(OperationError::NothingNear { what: "clamp", point, reach })
     }
 
-    /// Undoes the last action that changed one of the targets, on all of them that it changed.
-    fn undo(&mut self, targets: &[Target], journal: &mut Vec<Vec<Entity>>) -> Vec<VesselOperation> {
-        while let Some(at) =
-            journal.iter().rposition(|changed| targets.iter().any(|target| changed.contains(&target.vessels)))
-        {
+    /// Undoes the last action or stroke that changed one of the targets, on all of them that it changed.
+    fn undo(&mut self, targets: &[Target], journal: &mut Journal) -> Vec<VesselOperation> {
+        let is_target = |vessels: Entity| targets.iter().any(|target| target.vessels == vessels);
+        while let Some(changed) = journal.take_last(is_target) {
             let mut done = Vec::new();
-            for &target in targets.iter().filter(|target| journal[at].contains(&target.vessels)) {
-                let undo = |wounds: &mut Wounds, vessels: &Vessels, _: &VesselIndex| {
-                    Ok(wounds.undo(vessels.tree()).unwrap_or_default())
+            for target in targets {
+                let Some(&(_, actions)) = changed.iter().find(|(vessels, _)| *vessels == target.vessels) else {
+                    continue;
                 };
-                done.extend(self.operate(target, OperationKind::Undone, undo).ok().flatten());
+                let undo = |wounds: &mut Wounds, vessels: &Vessels, _: &VesselIndex| {
+                    Ok(wounds.undo_last(actions, vessels.tree()))
+                };
+                done.extend(self.operate(*target, OperationKind::Undone, undo).ok().flatten());
             }
-            forget(journal, at, targets);
             // What a regrowth has cleared is nothing to undo: the one before it is meant.
             if !done.is_empty() {
                 return done;
@@ -276,20 +279,10 @@ impl Theatre<'_, '_> {
         Vec::new()
     }
 
-    fn undo_all(&mut self, targets: &[Target], journal: &mut Vec<Vec<Entity>>) -> Vec<VesselOperation> {
-        for at in (0..journal.len()).rev() {
-            forget(journal, at, targets);
-        }
+    fn undo_all(&mut self, targets: &[Target], journal: &mut Journal) -> Vec<VesselOperation> {
+        journal.forget(|vessels| targets.iter().any(|target| target.vessels == vessels));
         let undo = |wounds: &mut Wounds, vessels: &Vessels, _: &VesselIndex| Ok(wounds.undo_all(vessels.tree()));
         targets.iter().filter_map(|&target| self.operate(target, OperationKind::Undone, undo).ok().flatten()).collect()
-    }
-}
-
-/// Takes the targets out of an entry of the journal, and the entry out of the journal when none is left.
-fn forget(journal: &mut Vec<Vec<Entity>>, at: usize, targets: &[Target]) {
-    journal[at].retain(|entity| targets.iter().all(|target| target.vessels != *entity));
-    if journal[at].is_empty() {
-        journal.remove(at);
     }
 }
 

@@ -6,7 +6,7 @@ use crate::plugin::{
     circulation::CirculationState,
     components::OrganVessels,
     cutting::CuttableVessels,
-    open_ends::OpenEndEntities,
+    open_ends::{OpenEndEntities, despawn_children},
     segment_changes::SegmentChanges,
     vessel_index::VesselIndex,
     vessels::{Lineage, Vessels},
@@ -25,6 +25,7 @@ use bevy::{
         query::{Changed, Or, With, Without},
         reflect::ReflectComponent,
         system::{Commands, Query},
+        world::EntityWorldMut,
     },
     log::warn,
     reflect::{Reflect, std_traits::ReflectDefault},
@@ -163,7 +164,8 @@ pub(crate) fn remove_wounds(
     }
     for &entity in entities.entities() {
         let Ok((ends, mut changes)) = vessels.get_mut(entity) else { continue };
-        ends.iter().for_each(|(_, end)| commands.entity(end).try_despawn());
+        let closed = ends.iter().map(|(_, end)| end).collect();
+        commands.entity(entity).queue_silenced(|vessels: EntityWorldMut| despawn_children(vessels, closed));
         changes.mark_all();
         commands.entity(entity).try_remove::<(VesselWounds, VesselIndex, OpenEndEntities)>();
     }

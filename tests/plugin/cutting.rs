@@ -5,7 +5,7 @@ use crate::*;
 use bevy::math::Affine3A;
 use bevy_vessels::{
     plugin::{
-        Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, VesselAction,
+        Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, StrokeId, VesselAction,
         VesselCommand, VesselIndex, VesselOperation, VesselOperationFailed, VesselProbe, VesselSite, VesselWounds,
     },
     synthesis::{
@@ -119,6 +119,82 @@ fn messages_and_the_resource_do_the_same() {
     });
     assert_eq!(results[0], results[1]);
     assert!(results[0].1.iter().all(|ends| ends.len() > 4), "{:?}", results[0].1);
+}
+
+/// A scalpel's way along x over some of a tube's segments, in as many frames: the number of the segment that each crosses.
+fn sweeps(segments: std::ops::Range<u32>) -> impl Iterator<Item = (NodeId, Blade)> {
+    segments.map(|node| (NodeId(node), square(Vec3::X * (node as f32 - 0.5), Vec3::X, 1.0)))
+}
+
+#[test]
+fn a_stroke_of_many_frames_is_undone_at_once() {
+    let mut app = theatre(FRAME);
+    let organ = organ_of(&mut app, &[(System::Arterial, &tube(20.0, 0.1, 20))], Cuttable::default());
+    cut(&mut app, square(Vec3::X * 18.5, Vec3::X, 1.0));
+    let before: Vec<_> = open_ends(&mut app);
+    let mut messages = MessageCursor::default();
+    let stroke = StrokeId::begin();
+    for (number, (node, blade)) in sweeps(1..7).enumerate() {
+        if number % 2 == 0 {
+            operate(&mut app, |vessels| vessels.in_stroke(stroke).cut(blade));
+        } else {
+            let command = VesselCommand::new(VesselAction::Cut(blade)).on(organ).in_stroke(stroke);
+            app.world_mut().write_message(command);
+            app.update();
+        }
+        let done: Vec<VesselOperation> = drain(app.world(), &mut messages);
+        assert!(done.iter().any(|done| done.stroke == Some(stroke) && done.report.changed == [node]), "{done:?}");
+        assert_eq!(app.world().resource::<CuttableVessels>().actions(), 2, "what was before, and the stroke");
+    }
+    let opened: Vec<_> = open_ends(&mut app).iter().filter(|end| !before.contains(end)).map(|end| end.id).collect();
+    operate(&mut app, CuttableVessels::undo);
+    let undone: Vec<VesselOperation> = drain(app.world(), &mut messages);
+    let [VesselOperation { kind: OperationKind::Undone, stroke: None, report, .. }] = &undone[..] else {
+        panic!("one operation, not {undone:?}")
+    };
+    assert_eq!((report.changed.len(), &report.opened), (6, &Vec::new()));
+    assert_eq!(report.closed, opened);
+    assert_eq!(open_ends(&mut app), before);
+    // It may go on after an undo.
+    operate(&mut app, |vessels| vessels.in_stroke(stroke).cut(square(Vec3::X * 0.5, Vec3::X, 1.0)));
+    (0..2).for_each(|_| operate(&mut app, CuttableVessels::undo));
+    assert_eq!(open_ends(&mut app), []);
+}
+
+#[test]
+fn strokes_of_two_hands_are_undone_apart_unless_they_meet() {
+    let mut app = theatre(FRAME);
+    let tree = tube(20.0, 0.1, 20);
+    let organs = [(); 2].map(|()| organ_of(&mut app, &[(System::Arterial, &tree)], Cuttable::default()));
+    let severed_of = |app: &App| organs.map(|organ| severed(app.world(), organ, System::Arterial).len());
+    let hands = organs.map(|organ| (organ, StrokeId::begin()));
+    for (_, blade) in sweeps(1..5) {
+        operate(&mut app, |vessels| {
+            for (organ, stroke) in hands {
+                vessels.request(VesselCommand::new(VesselAction::Cut(blade.clone())).on(organ).in_stroke(stroke));
+            }
+        });
+    }
+    assert_eq!(severed_of(&app), [4, 4]);
+    operate(&mut app, CuttableVessels::undo);
+    assert_eq!(severed_of(&app), [4, 0], "the one that began last");
+    // The scalpel goes on over what the cautery sealed, on the same vessel: neither can be undone without the other.
+    let cautery = StrokeId::begin();
+    for (node, blade) in sweeps(6..9) {
+        let ball = Blade::ball(Vec3::X * (node.0 as f32 + 4.5), 0.3).expect("a ball");
+        operate(&mut app, |vessels| {
+            vessels.in_stroke(cautery).cauterise(ball, f32::INFINITY);
+            vessels.request(VesselCommand::new(VesselAction::Cut(blade)).on(organs[0]).in_stroke(hands[0].1));
+        });
+    }
+    let sealed = wounds(app.world(), organs[0], System::Arterial).injured().count();
+    assert_eq!((severed_of(&app), sealed), ([7, 0], 10));
+    assert_eq!(app.world().resource::<CuttableVessels>().actions(), 1);
+    operate(&mut app, |vessels| vessels.request(VesselCommand::new(VesselAction::Undo).on(organs[0])));
+    assert!(wounds(app.world(), organs[0], System::Arterial).is_empty());
+    assert!(!wounds(app.world(), organs[1], System::Arterial).is_empty(), "the cautery reached the other organ too");
+    operate(&mut app, CuttableVessels::undo);
+    assert!(wounds(app.world(), organs[1], System::Arterial).is_empty());
 }
 
 #[test]

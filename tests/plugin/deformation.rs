@@ -2,9 +2,10 @@
 
 use crate::theatre::*;
 use crate::*;
+use bevy::math::Affine3A;
 use bevy_vessels::{
-    plugin::{Cuttable, FollowsMesh, SegmentChanges},
-    synthesis::tree::NodeId,
+    plugin::{Cuttable, FollowsMesh, FollowsTetrahedra, SegmentChanges},
+    synthesis::{binding::TetMesh, tissue::TissueMode, tree::NodeId},
 };
 
 const FRAME: Duration = Duration::from_millis(16);
@@ -143,7 +144,9 @@ fn another_number_of_vertices_is_another_organ() {
     let organ = following(&mut app);
     let before = trees(app.world(), organ);
     edit_mesh(&mut app, organ, |mesh| *mesh = Sphere::new(0.5).mesh().uv(40, 20));
-    run_until(&mut app, "a restart", |world| progress(world, organ).phase != GrowthPhase::Finished);
+    // A quick machine grows it anew within one frame.
+    let nodes = progress(app.world(), organ).nodes;
+    run_until(&mut app, "a restart", |world| progress(world, organ).nodes != nodes);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     (0..2).for_each(|_| app.update());
     let grown = trees(app.world(), organ);
@@ -164,5 +167,116 @@ fn an_unstable_soft_body_moves_nothing_and_does_not_stop_the_app() {
     let before = trees(app.world(), organ);
     move_vertices(&mut app, organ, |at| at * f32::NAN);
     (0..2).for_each(|_| app.update());
+    assert_eq!(before, trees(app.world(), organ));
+}
+
+/// A box from −0.5 to 0.5, of n³ cells with six tetrahedra in each: Kuhn's, along the edges of a cell from one corner to the
+/// opposite, in every order of the axes.
+fn solid_box(n: u32) -> TetMesh {
+    let side = n + 1;
+    let number = |[x, y, z]: [u32; 3]| x + side * (y + side * z);
+    let cells = |n: u32| (0..n * n * n).map(move |cell| [cell % n, cell / n % n, cell / n / n]);
+    let positions = cells(side).map(|at| Vec3::from_array(at.map(|i| i as f32 / n as f32 - 0.5))).collect();
+    let tetrahedron = |mut at: [u32; 3], order: [usize; 3]| {
+        let mut corners = [number(at); 4];
+        for (corner, axis) in corners[1..].iter_mut().zip(order) {
+            at[axis] += 1;
+            *corner = number(at);
+        }
+        corners
+    };
+    let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+    let tetrahedra = cells(n).flat_map(|cell| orders.map(|order| tetrahedron(cell, order))).collect();
+    TetMesh::new(positions, tetrahedra).expect("tetrahedra")
+}
+
+/// Vessels through a box, which follow its tetrahedra.
+fn solid(app: &mut App) -> Entity {
+    let mut vasculature = quick();
+    vasculature.tissue.mode = TissueMode::Volume;
+    let mesh = add_mesh(app, Cuboid::from_length(1.0));
+    let tetrahedra = FollowsTetrahedra::new(solid_box(4));
+    let organ = app.world_mut().spawn((Mesh3d(mesh), vasculature, Cuttable::default(), tetrahedra)).id();
+    run_to_phase(app, organ, GrowthPhase::Finished);
+    (0..2).for_each(|_| app.update());
+    organ
+}
+
+fn move_tetrahedra(app: &mut App, organ: Entity, to: impl Fn(Vec3) -> Vec3) {
+    let mut tetrahedra = app.world_mut().get_mut::<FollowsTetrahedra>(organ).expect("the organ has tetrahedra");
+    tetrahedra.positions_mut().iter_mut().for_each(|at| *at = to(*at));
+}
+
+#[track_caller]
+fn assert_moved(now: &[VesselTree; 2], before: &[VesselTree; 2], to: impl Fn(Vec3) -> Vec3) {
+    for (now, before) in now.iter().zip(before) {
+        assert!(before.len() > 100, "{} nodes are too few to tell", before.len());
+        assert_eq!((now.parents(), now.radii()), (before.parents(), before.radii()));
+        for (now, before) in now.positions().iter().zip(before.positions()) {
+            assert!(now.distance(to(*before)) < 2e-6, "{now} for {}", to(*before));
+        }
+    }
+}
+
+#[test]
+fn vessels_within_a_sheared_box_move_as_every_point_of_it() {
+    let mut app = theatre(FRAME);
+    let organ = solid(&mut app);
+    let before = trees(app.world(), organ);
+    let inside = before[0].positions().iter().filter(|at| at.abs().max_element() < 0.4).count();
+    assert!(inside > 50, "{inside} nodes are too few within the box");
+    let (point, normal) = (Vec3::Y * 0.1, Vec3::Y);
+    cut(&mut app, square(point, normal, 3.0));
+    let ends_before = open_ends(&mut app);
+    assert!(ends_before.len() > 8, "{}", ends_before.len());
+    let mut map = Affine3A::from_translation(Vec3::new(0.2, -0.1, 0.3));
+    map.matrix3.y_axis += Vec3A::new(0.6, 0.0, -0.2);
+    map.matrix3.x_axis *= 1.3;
+    move_tetrahedra(&mut app, organ, |at| map.transform_point3(at));
+    app.update();
+    assert_moved(&trees(app.world(), organ), &before, |at| map.transform_point3(at));
+    for (now, before) in open_ends(&mut app).iter().zip(&ends_before) {
+        assert_eq!((now.id, now.place), (before.id, before.place), "a cut stays at its spot of the vessel");
+        assert!(now.position.distance(map.transform_point3(before.position)) < 2e-6);
+        let direction = map.transform_vector3(before.direction).normalize();
+        assert!(now.direction.distance(direction) < 1e-3, "{} for {direction}", now.direction);
+    }
+    // The blade meets them where they are.
+    let level = map.transform_point3(2.0 * point).y;
+    cut(&mut app, square(Vec3::Y * level, normal, 3.0));
+    let vessels = published(app.world(), organ, System::Arterial);
+    let below = |node: usize| vessels.tree().positions()[node].y < level;
+    let crossed: Vec<_> = vessels.tree().segments().filter(|&(node, parent)| below(node) != below(parent)).collect();
+    assert!(!crossed.is_empty());
+    let wounds = wounds(app.world(), organ, System::Arterial);
+    assert!(crossed.iter().all(|&(node, _)| wounds.is_severed(NodeId(node as u32))));
+    assert_eq!(progress(app.world(), organ).phase, GrowthPhase::Finished);
+}
+
+#[test]
+fn tetrahedra_may_be_replaced_and_taken_away() {
+    let mut app = theatre(FRAME);
+    let organ = solid(&mut app);
+    let before = trees(app.world(), organ);
+    move_tetrahedra(&mut app, organ, |at| at * f32::NAN);
+    (0..2).for_each(|_| app.update());
+    assert_eq!(before, trees(app.world(), organ), "an unstable soft body moves nothing");
+    let finer = FollowsTetrahedra::new(solid_box(5));
+    app.world_mut().entity_mut(organ).insert(finer);
+    app.update();
+    assert_eq!(before, trees(app.world(), organ), "these are at rest");
+    move_tetrahedra(&mut app, organ, |at| at * 2.0);
+    app.update();
+    assert_moved(&trees(app.world(), organ), &before, |at| at * 2.0);
+    // The surface is drawn deformed, too. It is followed only once the tetrahedra are gone.
+    app.world_mut().entity_mut(organ).insert(FollowsMesh);
+    move_vertices(&mut app, organ, |at| at + Vec3::X);
+    app.update();
+    assert_moved(&trees(app.world(), organ), &before, |at| at * 2.0);
+    assert_eq!(progress(app.world(), organ).phase, GrowthPhase::Finished, "a deformed mesh is no other mesh");
+    app.world_mut().entity_mut(organ).remove::<FollowsTetrahedra>();
+    (0..2).for_each(|_| app.update());
+    assert_moved(&trees(app.world(), organ), &before, |at| at + Vec3::X);
+    app.world_mut().entity_mut(organ).remove::<FollowsMesh>();
     assert_eq!(before, trees(app.world(), organ));
 }

@@ -10,6 +10,7 @@ mod entities;
 mod errors;
 mod growth;
 mod theatre;
+mod units;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};
 use bevy_vessels::{

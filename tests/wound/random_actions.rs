@@ -123,12 +123,12 @@ fn reports_add_up_and_undo_leads_back() {
         let mut severed = 0;
         for _ in 0..700 {
             if rng.random_range(0..12) == 0 {
-                let report = wounds.undo(&tree);
-                assert_eq!(report.is_some(), states.len() > 1);
-                if let Some(report) = report {
-                    heard.hear(&report);
-                    states.pop();
-                }
+                let actions = rng.random_range(1..5);
+                let report = wounds.undo_last(actions, &tree);
+                assert_eq!(report.is_empty(), states.len() == 1);
+                assert!(report.changed.is_sorted_by(|a, b| a < b), "each once, in their order: {:?}", report.changed);
+                heard.hear(&report);
+                states.truncate(states.len().saturating_sub(actions).max(1));
                 assert_eq!((state(&wounds, &tree), heard.clone()), *states.last().unwrap(), "seed {seed}");
             } else if let Some(report) = act(&mut rng, &mut wounds, &tree, &heard) {
                 severed += report.severed;

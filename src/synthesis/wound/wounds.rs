@@ -186,9 +186,18 @@ impl Wounds {
 
     /// Undoes the last action that changed anything; `None` where there is none.
     pub fn undo(&mut self, tree: &VesselTree) -> Option<WoundReport> {
-        let action = self.journal.pop()?;
+        (!self.journal.is_empty()).then(|| self.undo_last(1, tree))
+    }
+
+    /// Undoes the last actions that changed anything, and reports what that changed in sum: all where they are fewer.
+    pub fn undo_last(&mut self, actions: usize, tree: &VesselTree) -> WoundReport {
         let mut report = WoundReport::default();
-        let touched = self.before.split_off(action.before);
+        let left = self.journal.len().saturating_sub(actions);
+        let Some(&first) = self.journal.get(left) else { return report };
+        let mut touched = self.before.split_off(first.before);
+        // Of what a segment was before several actions, the first counts: the order of these stays.
+        touched.sort_by_key(|&(node, _)| node);
+        touched.dedup_by_key(|&mut (node, _)| node);
         for (node, before) in touched {
             let now = self.injuries.remove(&node).unwrap_or_default();
             self.compare(tree, node, &now, &before, &mut report);
@@ -196,9 +205,10 @@ impl Wounds {
                 self.injuries.insert(node, before);
             }
         }
-        self.ends.truncate(action.ends);
-        self.clamps.truncate(action.clamps);
-        Some(report)
+        self.journal.truncate(left);
+        self.ends.truncate(first.ends);
+        self.clamps.truncate(first.clamps);
+        report
     }
 
     /// Undoes all actions, and reports what that changed in sum.
