@@ -66,6 +66,32 @@ impl Pack {
         bits(meets)
     }
 
+    /// A bit for each box that may have a point between all pairs of planes, of those that overlap the slabs' box.
+    pub(crate) fn enters(&self, slabs: &Slabs) -> u8 {
+        let (mut middle, mut half) = ([[0f32; LANES]; 3], [[0f32; LANES]; 3]);
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let (min, max) = (self.min[axis][lane], self.max[axis][lane]);
+                middle[axis][lane] = 0.5 * min + 0.5 * max;
+                half[axis][lane] = (0.5 * max - 0.5 * min) * WIDENED;
+            }
+        }
+        let mut meets = [true; LANES];
+        for &(axis, center, reach) in &slabs.0 {
+            let (mut apart, mut room) = ([-center; LANES], [reach; LANES]);
+            for (along, axis) in axis.to_array().into_iter().enumerate() {
+                for lane in 0..LANES {
+                    apart[lane] += axis * middle[along][lane];
+                    room[lane] += axis.abs() * half[along][lane];
+                }
+            }
+            for lane in 0..LANES {
+                meets[lane] &= apart[lane].abs() <= room[lane];
+            }
+        }
+        bits(meets)
+    }
+
     /// A bit for each box that a test lets through.
     pub(crate) fn passes(&self, test: impl Fn(Vec3, Vec3) -> bool) -> u8 {
         bits(std::array::from_fn(|lane| {
@@ -104,8 +130,12 @@ impl Pack {
     }
 }
 
+/// Factor that adds a few roundings to a length.
+const WIDENED: f32 = 1.0 + 2.0e-6;
 /// Factor that takes a few roundings off a length or its square.
 const SHORTENED: f32 = 1.0 - 1.0e-6;
+/// How far a slab is widened, relative to the coordinates of what lies in it.
+const SLAB_ROOM: f32 = 2.0e-6;
 /// How far a box is widened against a ray, relative to its coordinates.
 const RAY_ROOM: f32 = 1.0e-6;
 
@@ -126,6 +156,24 @@ impl Ray {
     pub(crate) fn new(from: Vec3, direction: Vec3) -> Self {
         let inverse = |along: f32| if along.abs() < 1.0e-30 { 1.0e30 } else { along.recip() };
         Self { from, inverse: Vec3::from_array(direction.to_array().map(inverse)) }
+    }
+}
+
+/// The space between three pairs of planes, ready to be tested against packs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slabs([(Vec3, f32, f32); 3]);
+
+impl Slabs {
+    /// Slabs across three directions, unit or zero: from the least to the greatest product of a point with each. The
+    /// shape in between lies within a box, and only for boxes that overlap that are they right.
+    pub(crate) fn new((min, max): Corners, slabs: [(Vec3, [f64; 2]); 3]) -> Self {
+        // The middle of a box that overlaps is no farther out than this and half that box. The roundings of its product
+        // with an axis are in proportion.
+        let far = min.abs().max(max.abs());
+        Self(slabs.map(|(axis, [low, high])| {
+            let room = SLAB_ROOM * axis.abs().dot(far);
+            (axis, (0.5 * (low + high)) as f32, (0.5 * (high - low)) as f32 * WIDENED + room)
+        }))
     }
 }
 

@@ -8,9 +8,12 @@
 //! and while the run before it is less than twice as long the two become one: runs at least halve from each to the next, so a tree
 //! of n nodes has at most log₂ n of them, and a node is sorted anew log₂ n times at most while its tree grows.
 
-use super::round_cone::{RoundCone, box_around};
+use super::{
+    Region,
+    round_cone::{RoundCone, box_around},
+};
 use crate::synthesis::{
-    packed_boxes::{PackedBoxes, Ray, curve_order},
+    packed_boxes::{Pack, PackedBoxes, Ray, curve_order},
     tree::{NO_PARENT, NodeId, Place, VesselTree},
 };
 use bevy_math::Vec3;
@@ -153,6 +156,20 @@ impl SegmentIndex {
             for run in &self.runs {
                 run.boxes.walk(|pack| pack.overlaps((min, max)), |slot| visit(NodeId(run.ends[slot])));
             }
+        }
+    }
+
+    /// Visits the end node of every segment whose box may have a point in common with a region, and perhaps others.
+    ///
+    /// In no particular order, but always in the same.
+    pub fn candidates_in(&self, region: &Region, mut visit: impl FnMut(NodeId)) {
+        let Some(slabs) = region.slabs() else { return self.candidates(region.min(), region.max(), visit) };
+        for run in &self.runs {
+            let meets = |pack: &Pack| match pack.overlaps(region.corners()) {
+                0 => 0,
+                overlaps => overlaps & pack.enters(slabs),
+            };
+            run.boxes.walk(meets, |slot| visit(NodeId(run.ends[slot])));
         }
     }
 
