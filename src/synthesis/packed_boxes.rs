@@ -1,6 +1,6 @@
 //! Boxes in packs of eight: a search tree without links, quick to build and to refit.
 //!
-//! Boxes come in an order in which neighbours in the list are neighbours in space, as [`curve_order`] gives it. Eight
+//! Boxes come in an order in which neighbours in the list are neighbours in space, as a [`Curve`] passes them. Eight
 //! in a row make a pack, eight packs in a row a pack of the next level, up to a single one: a packed R-tree (Kamel &
 //! Faloutsos, "On packing R-trees", CIKM 1993). Where a box is follows from its number alone, so nothing is stored but
 //! the boxes, a changed box is corrected along one path, and the eight of a pack are tested at once.
@@ -18,7 +18,7 @@ const LANES: usize = 8;
 const LEVELS: usize = 11;
 /// Room for what is still to be visited: seven siblings stay behind on each level, and eight slots lie on the last.
 const STACK: usize = (LEVELS + 1) * LANES;
-/// Bits of a coordinate in the key of [`curve_order`].
+/// Bits of a coordinate in the key of a [`Curve`].
 const KEY_BITS: u32 = 21;
 
 /// Corners of a box.
@@ -191,6 +191,14 @@ pub(crate) struct PackedBoxes {
 impl PackedBoxes {
     /// Packs `len` boxes, asked for in the order of their slots.
     pub(crate) fn new(len: usize, box_at: impl FnMut(usize) -> Corners) -> Self {
+        let mut tree = Self::reserve(len);
+        tree.packs.resize(tree.starts.last().map_or(0, |&end| end as usize), Pack::EMPTY);
+        tree.refit(box_at);
+        tree
+    }
+
+    /// Room for `len` boxes, which are to be [pushed](Self::push) and then [raised](Self::raise).
+    pub(crate) fn reserve(len: usize) -> Self {
         let (mut starts, mut total, mut items) = (vec![0], 0, len);
         while items > 0 {
             items = items.div_ceil(LANES);
@@ -200,9 +208,37 @@ impl PackedBoxes {
                 break;
             }
         }
-        let mut tree = Self { packs: vec![Pack::EMPTY; total], starts, len };
-        tree.refit(box_at);
-        tree
+        Self { packs: Vec::with_capacity(total), starts, len }
+    }
+
+    /// Adds the box of the next slot.
+    pub(crate) fn push(&mut self, slot: usize, corners: Corners) {
+        self.put(slot / LANES, slot % LANES, corners);
+    }
+
+    /// Lets the pack above take in one pack, the next in the order of the levels. Returns whether there was one to do so.
+    pub(crate) fn raise(&mut self, index: usize) -> bool {
+        let level = self.starts.partition_point(|&start| start as usize <= index) - 1;
+        if level + 1 >= self.levels() {
+            return false;
+        }
+        let item = index - self.starts[level] as usize;
+        let around = self.packs[index].around();
+        self.put(self.starts[level + 1] as usize + item / LANES, item % LANES, around);
+        true
+    }
+
+    /// Sets a box of a pack, the last there is or the next.
+    fn put(&mut self, index: usize, lane: usize, corners: Corners) {
+        if index == self.packs.len() {
+            self.packs.push(Pack::EMPTY);
+        }
+        self.packs[index].set(lane, corners);
+    }
+
+    /// The box of a slot.
+    pub(crate) fn get(&self, slot: usize) -> Corners {
+        self.packs[slot / LANES].get(slot % LANES)
     }
 
     /// Measures every box anew.
@@ -219,11 +255,11 @@ impl PackedBoxes {
         }
     }
 
-    /// Changes one box.
+    /// Changes one box, and those around it that have been raised.
     pub(crate) fn set(&mut self, slot: usize, corners: Corners) {
         let (mut item, mut corners) = (slot, corners);
         for level in 0..self.levels() {
-            let pack = &mut self.packs[self.starts[level] as usize + item / LANES];
+            let Some(pack) = self.packs.get_mut(self.starts[level] as usize + item / LANES) else { return };
             if pack.get(item % LANES) == corners {
                 return;
             }
@@ -331,31 +367,32 @@ impl PackedBoxes {
     }
 }
 
-/// Numbers of points in the order of a space-filling curve through the box around them; of points in one cell of the
-/// curve the first comes first.
+/// A space-filling curve through a box.
 ///
-/// The curve is Morton's: 21 bits of each coordinate, interleaved.
-pub(crate) fn curve_order(points: &[Vec3]) -> Vec<u32> {
-    let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for &point in points {
-        min = min.min(point);
-        max = max.max(point);
+/// The curve is Morton's: 21 bits of each coordinate, interleaved. What lies outside counts as at the nearest face.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Curve {
+    min: Vec3,
+    scale: f32,
+}
+
+impl Curve {
+    /// A curve through the cube around points, made wider by a factor around its middle.
+    pub(crate) fn around(points: impl Iterator<Item = Vec3>, wider: f32) -> Self {
+        let around = |(min, max): Corners, point: Vec3| (min.min(point), max.max(point));
+        let (min, max) = points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), around);
+        let largest = ((1u32 << KEY_BITS) - 1) as f32;
+        // Points that coincide, and no points, have one cell.
+        let size = wider * (max - min).max_element();
+        if size > 0.0 { Self { min: min.midpoint(max) - 0.5 * size, scale: largest / size } } else { Self::default() }
     }
-    let largest = ((1u32 << KEY_BITS) - 1) as f32;
-    // Points that coincide, and no points, have one cell.
-    let size = (max - min).max_element();
-    let scale = if size > 0.0 { largest / size } else { 0.0 };
-    let mut keys: Vec<(u64, u32)> = points
-        .iter()
-        .enumerate()
-        .map(|(number, &point)| {
-            // The cast saturates.
-            let cell = ((point - min) * scale).as_uvec3().to_array().map(spread);
-            (cell[0] | cell[1] << 1 | cell[2] << 2, number as u32)
-        })
-        .collect();
-    keys.sort_unstable();
-    keys.into_iter().map(|(_, number)| number).collect()
+
+    /// Where on the curve a point is.
+    pub(crate) fn key(&self, point: Vec3) -> u64 {
+        // The cast saturates.
+        let cell = ((point - self.min) * self.scale).as_uvec3().to_array().map(spread);
+        cell[0] | cell[1] << 1 | cell[2] << 2
+    }
 }
 
 /// Moves the lowest 21 bits apart, two zeros between each two.
@@ -389,13 +426,17 @@ mod tests {
     fn curve_passes_octant_by_octant() {
         let corners: Vec<Vec3> =
             (0..64u8).rev().map(|i| Vec3::new(f32::from(i & 3), f32::from(i >> 2 & 3), f32::from(i >> 4))).collect();
-        let octant = |number: u32| (corners[number as usize] / 2.0).as_uvec3();
-        let order = curve_order(&corners);
-        for eight in order.chunks(8) {
-            assert!(eight.iter().all(|&number| octant(number) == octant(eight[0])));
+        for wider in [1.0, 4.0] {
+            let curve = Curve::around(corners.iter().copied(), wider);
+            let mut order = corners.clone();
+            order.sort_by_key(|&corner| curve.key(corner));
+            for eight in order.chunks(8) {
+                assert!(eight.iter().all(|corner| (corner / 2.0).as_uvec3() == (eight[0] / 2.0).as_uvec3()));
+            }
         }
-        assert_eq!(curve_order(&[Vec3::ONE; 3]), [0, 1, 2]);
-        assert!(curve_order(&[]).is_empty());
+        let point = Curve::around([Vec3::ONE; 3].into_iter(), 1.0);
+        assert_eq!(point.key(Vec3::ONE), Curve::default().key(Vec3::NEG_ONE));
+        assert_eq!(Curve::around(std::iter::empty(), 1.0).key(Vec3::ONE), 0);
     }
 
     #[test]

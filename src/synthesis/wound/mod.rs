@@ -56,6 +56,7 @@ mod report;
 mod retraction;
 mod round_cone;
 mod segment_index;
+mod segment_run;
 mod stumps;
 mod wounds;
 
