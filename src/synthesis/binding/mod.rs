@@ -73,7 +73,7 @@ pub struct Binding {
 
 #[derive(Clone, Debug)]
 enum Bonds {
-    Surface(SurfaceBonds),
+    Surface(Box<SurfaceBonds>),
     Solid(SolidBonds),
 }
 
@@ -83,7 +83,7 @@ impl Binding {
     /// Of equally near triangles the first counts; degenerate ones are left out. Vertices at the same position count as
     /// one for normals, so that seams don't show.
     pub fn to_surface(tree: &VesselTree, mesh: &TriangleMesh) -> Self {
-        let mut binding = Self { bonds: Bonds::Surface(SurfaceBonds::new(mesh)) };
+        let mut binding = Self { bonds: Bonds::Surface(Box::new(SurfaceBonds::new(mesh))) };
         binding.extend(tree);
         binding
     }
