@@ -8,8 +8,8 @@
 //! the matrix of a tree whose links end in a given pressure, and E that of the links between them, the arterial
 //! pressures obey (Tₐ − E·Tᵥ⁻¹·Eᵀ)·p = b. The matrix is symmetric and positive, and conjugate gradients preconditioned
 //! by Tₐ⁻¹ need one pair of sweeps of each tree in a pass: not of all its nodes, but of those that links and open ends sit
-//! at and of the forks between them, all else having been eliminated once. The error falls by the factor (1 − √(1 − c))/(1 + √(1 − c))
-//! or better, where c < 1 is the largest share of a change of pressure that comes back through the links from the other
+//! at and of the forks between them, all else having been eliminated once. The error falls by the factor
+//! (1 − √(1 − c))/(1 + √(1 − c)) or better, where c < 1 is the largest share of a change of pressure that comes back through the links from the other
 //! side: few where the bed resists much, many where it hardly does. With two trees of 100,000 segments and 3,000 links it
 //! takes 12 passes where the bed takes about half of the pressure, 34 for a sixth of it, 81 for a thirtieth.
 //! The limit of passes is an error. From the last solution on it takes none where nothing has changed.
@@ -150,6 +150,8 @@ impl Circulation {
     /// Imbalance of a linked node, relative to the largest flow in a link, and correction of its pressure, relative to the
     /// largest, at which they end.
     const ACCURACY: f64 = 1e-12;
+    /// The same in the first round for the open ends, whose flow is a guess.
+    const FIRST_ACCURACY: f64 = 1e-4;
     /// Rounding of a pressure, relative to the largest.
     const ROUNDING: f64 = 1e-14;
     /// Passes of Newton's method for the open ends before it counts as failed; some five are usual.
@@ -243,11 +245,12 @@ impl Circulation {
         self.sides[0].prepare(&mut self.arterial);
         self.sides[1].prepare(&mut self.venous);
         let mut residual = f64::INFINITY;
+        let mut accuracy = if has_ends { Self::FIRST_ACCURACY } else { Self::ACCURACY };
         for round in 0..Self::MOST_ROUNDS {
             for network in [&mut self.arterial, &mut self.venous] {
                 network.linearise_ends();
             }
-            self.balance()?;
+            self.balance(accuracy)?;
             if !has_ends {
                 self.drive();
                 return Ok(());
@@ -256,9 +259,13 @@ impl Circulation {
             let [arteries, veins] = &self.sides;
             residual = self.arterial.accept_ends(&arteries.quotient, damped);
             residual = residual.max(self.venous.accept_ends(&veins.quotient, damped));
-            if residual <= 1.0 {
+            if residual <= 1.0 && accuracy == Self::ACCURACY {
                 return self.finish();
             }
+            // Newton's method squares the error, so that a round needs to be no more exact than that. Ends that let out
+            // very little ask for more.
+            let expected = residual * OpenEnds::ACCURACY;
+            accuracy = (expected * expected).min(1e-3 * accuracy).clamp(Self::ACCURACY, Self::FIRST_ACCURACY);
         }
         let what = "the flow through the open ends of a circulation";
         let residual = residual * OpenEnds::ACCURACY;
@@ -277,16 +284,16 @@ impl Circulation {
         let [arteries, veins] = &self.sides;
         self.arterial.finish_ends(&arteries.quotient);
         self.venous.finish_ends(&veins.quotient);
-        self.balance()?;
+        self.balance(Self::ACCURACY)?;
         self.drive();
         Ok(())
     }
 
     /// Finds the pressures at links and open ends, with the ends as they are linearised.
-    fn balance(&mut self) -> Result<(), FlowError> {
+    fn balance(&mut self, accuracy: f64) -> Result<(), FlowError> {
         self.sides[0].quotient.eliminate(&self.arterial.ends);
         self.sides[1].quotient.eliminate(&self.venous.ends);
-        let (mut pressures, residual, tolerated) = self.begin_from_last();
+        let (mut pressures, residual, tolerated) = self.begin_from_last(accuracy);
         self.passes += self.descend(&mut pressures, residual, &tolerated)?;
         let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
         let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
@@ -310,7 +317,7 @@ impl Circulation {
 
     /// Solves each tree once from the last solution. Returns the arterial pressures at the links, the imbalance left
     /// there, and how much of it is tolerated.
-    fn begin_from_last(&mut self) -> (Vec<f64>, Vec<f64>, Tolerated) {
+    fn begin_from_last(&mut self, accuracy: f64) -> (Vec<f64>, Vec<f64>, Tolerated) {
         let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
         let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
         let before = veins.pressures.clone();
@@ -323,7 +330,7 @@ impl Circulation {
         let mut residual = into_arteries;
         arteries.carry(veins, *conductance, &change, &mut residual);
         arteries.excuse_roots(arterial, &mut residual);
-        let tolerated = self.tolerated(&pressures, &self.sides[1].pressures);
+        let tolerated = self.tolerated(accuracy, &pressures, &self.sides[1].pressures);
         (pressures, residual, tolerated)
     }
 
@@ -349,7 +356,7 @@ impl Circulation {
             arteries.excuse_roots(arterial, &mut carried);
             let curvature: f64 = direction.iter().zip(image.iter().zip(&carried)).map(|(d, (i, c))| d * (i - c)).sum();
             if passes == Self::MOST_PASSES || !(curvature > 0.0) {
-                let residual = Self::ACCURACY * largest(&residual) / tolerated.flow;
+                let residual = tolerated.accuracy * largest(&residual) / tolerated.flow;
                 return Err(FlowError::NotConverged { what: "the flow through the bed", passes, residual });
             }
             passes += 1;
@@ -372,18 +379,20 @@ impl Circulation {
 
     /// What is small enough: an imbalance relative to the largest flow in a link, and a correction relative to the
     /// pressures, or as much as rounding of the pressures makes of them.
-    fn tolerated(&self, arterial: &[f64], venous: &[f64]) -> Tolerated {
+    fn tolerated(&self, accuracy: f64, arterial: &[f64], venous: &[f64]) -> Tolerated {
         let [arteries, veins] = &self.sides;
         let links = arteries.of_links.iter().zip(&veins.of_links);
         let flows = links.map(|(&a, &v)| self.conductance * (arterial[a as usize] - venous[v as usize]).abs());
         let pressure = largest(arterial).max(largest(venous)).max(self.arterial.source.abs());
         let rounding = Self::ROUNDING * self.conductance * pressure;
-        Tolerated { flow: Self::ACCURACY * flows.fold(0.0, f64::max) + rounding, pressure: Self::ACCURACY * pressure }
+        Tolerated { accuracy, flow: accuracy * flows.fold(0.0, f64::max) + rounding, pressure: accuracy * pressure }
     }
 }
 
 /// How far from the solution conjugate gradients may end.
 struct Tolerated {
+    /// Relative.
+    accuracy: f64,
     /// In m³/s.
     flow: f64,
     /// In Pa.
