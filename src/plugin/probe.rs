@@ -8,7 +8,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     tree::{NodeId, Place, System},
-    wound::Wounds,
+    wound::{Region, Wounds},
 };
 use bevy::{
     ecs::{
@@ -107,7 +107,7 @@ pub(crate) fn nearest_place(touch: &Touch, vessels: &Vessels, wounds: &Wounds, i
     let half = reach.max(0.0) * unit + unevenness(unit * scale) * widest_radius(vessels, unit * scale);
     let center = to_local.transform_point3(point);
     let mut best: Option<Near> = None;
-    index.candidates(tree, center - half, center + half, &mut |node: NodeId| {
+    index.candidates(tree, &Region::between(center - half, center + half), &mut |node: NodeId| {
         let Some(parent) = tree.parent(node) else { return };
         let [a, b] = [parent, node].map(|node| to_world.transform_point3(tree.positions()[node.index()]));
         let radius = tree.radii()[node.index()] * scale;

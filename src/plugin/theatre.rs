@@ -12,7 +12,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     tree::Place,
-    wound::{Blade, ClampId, WoundError, WoundReport, Wounds},
+    wound::{Blade, ClampId, Region, WoundError, WoundReport, Wounds},
 };
 use bevy::{
     ecs::{
@@ -150,14 +150,14 @@ impl Theatre<'_, '_> {
     fn cut(&mut self, targets: &[Target], blade: &Blade) -> Outcome {
         self.sweep(targets, blade, OperationKind::Cut, |wounds, vessels, index, blade, _| {
             let tree = vessels.tree();
-            Ok(wounds.cut(blade, tree, |min, max, visit| index.candidates(tree, min, max, visit)))
+            Ok(wounds.cut(blade, tree, |region, visit| index.candidates(tree, region, visit)))
         })
     }
 
     fn cauterise(&mut self, targets: &[Target], volume: &Blade, max_calibre: f32) -> Outcome {
         self.sweep(targets, volume, OperationKind::Cauterised, |wounds, vessels, index, volume, scale| {
             let tree = vessels.tree();
-            let candidates = |min, max, visit: &mut dyn FnMut(_)| index.candidates(tree, min, max, visit);
+            let candidates = |region: &Region, visit: &mut dyn FnMut(_)| index.candidates(tree, region, visit);
             Ok(wounds.cauterise(volume, max_calibre / scale, tree, candidates)?)
         })
     }

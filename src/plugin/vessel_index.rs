@@ -7,11 +7,10 @@
 use crate::plugin::vessels::{Lineage, Vessels};
 use crate::synthesis::{
     tree::{NO_PARENT, NodeId, VesselTree},
-    wound::SegmentIndex,
+    wound::{Region, SegmentIndex},
 };
 use bevy::{
     ecs::{change_detection::DetectChanges, component::Component, system::Query, world::Ref},
-    math::Vec3,
     tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
 };
 
@@ -94,9 +93,10 @@ impl VesselIndex {
         }
     }
 
-    /// Visits at least the segments that meet a box, each by its end node. Call [`refresh`](Self::refresh) before.
-    pub(crate) fn candidates(&self, tree: &VesselTree, min: Vec3, max: Vec3, visit: &mut dyn FnMut(NodeId)) {
-        self.index.candidates(min, max, &mut *visit);
+    /// Visits at least the segments that meet a region, each by its end node. Call [`refresh`](Self::refresh) before.
+    pub(crate) fn candidates(&self, tree: &VesselTree, region: &Region, visit: &mut dyn FnMut(NodeId)) {
+        let (min, max) = (region.min(), region.max());
+        self.index.candidates_in(region, &mut *visit);
         for node in self.index.len()..tree.len() {
             let parent = tree.parents()[node];
             if parent == NO_PARENT {

@@ -1,6 +1,6 @@
 //! Boxes in packs of eight: a search tree without links, quick to build and to refit.
 //!
-//! Boxes come in an order in which neighbours in the list are neighbours in space, as [`curve_order`] gives it. Eight
+//! Boxes come in an order in which neighbours in the list are neighbours in space, as a [`Curve`] passes them. Eight
 //! in a row make a pack, eight packs in a row a pack of the next level, up to a single one: a packed R-tree (Kamel &
 //! Faloutsos, "On packing R-trees", CIKM 1993). Where a box is follows from its number alone, so nothing is stored but
 //! the boxes, a changed box is corrected along one path, and the eight of a pack are tested at once.
@@ -18,7 +18,7 @@ const LANES: usize = 8;
 const LEVELS: usize = 11;
 /// Room for what is still to be visited: seven siblings stay behind on each level, and eight slots lie on the last.
 const STACK: usize = (LEVELS + 1) * LANES;
-/// Bits of a coordinate in the key of [`curve_order`].
+/// Bits of a coordinate in the key of a [`Curve`].
 const KEY_BITS: u32 = 21;
 
 /// Corners of a box.
@@ -66,6 +66,32 @@ impl Pack {
         bits(meets)
     }
 
+    /// A bit for each box that may have a point between all pairs of planes, of those that overlap the slabs' box.
+    pub(crate) fn enters(&self, slabs: &Slabs) -> u8 {
+        let (mut middle, mut half) = ([[0f32; LANES]; 3], [[0f32; LANES]; 3]);
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let (min, max) = (self.min[axis][lane], self.max[axis][lane]);
+                middle[axis][lane] = 0.5 * min + 0.5 * max;
+                half[axis][lane] = (0.5 * max - 0.5 * min) * WIDENED;
+            }
+        }
+        let mut meets = [true; LANES];
+        for &(axis, center, reach) in &slabs.0 {
+            let (mut apart, mut room) = ([-center; LANES], [reach; LANES]);
+            for (along, axis) in axis.to_array().into_iter().enumerate() {
+                for lane in 0..LANES {
+                    apart[lane] += axis * middle[along][lane];
+                    room[lane] += axis.abs() * half[along][lane];
+                }
+            }
+            for lane in 0..LANES {
+                meets[lane] &= apart[lane].abs() <= room[lane];
+            }
+        }
+        bits(meets)
+    }
+
     /// A bit for each box that a test lets through.
     pub(crate) fn passes(&self, test: impl Fn(Vec3, Vec3) -> bool) -> u8 {
         bits(std::array::from_fn(|lane| {
@@ -104,8 +130,12 @@ impl Pack {
     }
 }
 
+/// Factor that adds a few roundings to a length.
+const WIDENED: f32 = 1.0 + 2.0e-6;
 /// Factor that takes a few roundings off a length or its square.
 const SHORTENED: f32 = 1.0 - 1.0e-6;
+/// How far a slab is widened, relative to the coordinates of what lies in it.
+const SLAB_ROOM: f32 = 2.0e-6;
 /// How far a box is widened against a ray, relative to its coordinates.
 const RAY_ROOM: f32 = 1.0e-6;
 
@@ -129,6 +159,24 @@ impl Ray {
     }
 }
 
+/// The space between three pairs of planes, ready to be tested against packs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slabs([(Vec3, f32, f32); 3]);
+
+impl Slabs {
+    /// Slabs across three directions, unit or zero: from the least to the greatest product of a point with each. The
+    /// shape in between lies within a box, and only for boxes that overlap that are they right.
+    pub(crate) fn new((min, max): Corners, slabs: [(Vec3, [f64; 2]); 3]) -> Self {
+        // The middle of a box that overlaps is no farther out than this and half that box. The roundings of its product
+        // with an axis are in proportion.
+        let far = min.abs().max(max.abs());
+        Self(slabs.map(|(axis, [low, high])| {
+            let room = SLAB_ROOM * axis.abs().dot(far);
+            (axis, (0.5 * (low + high)) as f32, (0.5 * (high - low)) as f32 * WIDENED + room)
+        }))
+    }
+}
+
 /// The tree over boxes in a given order. A box is known by its slot, its place in that order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PackedBoxes {
@@ -143,6 +191,14 @@ pub(crate) struct PackedBoxes {
 impl PackedBoxes {
     /// Packs `len` boxes, asked for in the order of their slots.
     pub(crate) fn new(len: usize, box_at: impl FnMut(usize) -> Corners) -> Self {
+        let mut tree = Self::reserve(len);
+        tree.packs.resize(tree.starts.last().map_or(0, |&end| end as usize), Pack::EMPTY);
+        tree.refit(box_at);
+        tree
+    }
+
+    /// Room for `len` boxes, which are to be [pushed](Self::push) and then [raised](Self::raise).
+    pub(crate) fn reserve(len: usize) -> Self {
         let (mut starts, mut total, mut items) = (vec![0], 0, len);
         while items > 0 {
             items = items.div_ceil(LANES);
@@ -152,9 +208,37 @@ impl PackedBoxes {
                 break;
             }
         }
-        let mut tree = Self { packs: vec![Pack::EMPTY; total], starts, len };
-        tree.refit(box_at);
-        tree
+        Self { packs: Vec::with_capacity(total), starts, len }
+    }
+
+    /// Adds the box of the next slot.
+    pub(crate) fn push(&mut self, slot: usize, corners: Corners) {
+        self.put(slot / LANES, slot % LANES, corners);
+    }
+
+    /// Lets the pack above take in one pack, the next in the order of the levels. Returns whether there was one to do so.
+    pub(crate) fn raise(&mut self, index: usize) -> bool {
+        let level = self.starts.partition_point(|&start| start as usize <= index) - 1;
+        if level + 1 >= self.levels() {
+            return false;
+        }
+        let item = index - self.starts[level] as usize;
+        let around = self.packs[index].around();
+        self.put(self.starts[level + 1] as usize + item / LANES, item % LANES, around);
+        true
+    }
+
+    /// Sets a box of a pack, the last there is or the next.
+    fn put(&mut self, index: usize, lane: usize, corners: Corners) {
+        if index == self.packs.len() {
+            self.packs.push(Pack::EMPTY);
+        }
+        self.packs[index].set(lane, corners);
+    }
+
+    /// The box of a slot.
+    pub(crate) fn get(&self, slot: usize) -> Corners {
+        self.packs[slot / LANES].get(slot % LANES)
     }
 
     /// Measures every box anew.
@@ -171,11 +255,11 @@ impl PackedBoxes {
         }
     }
 
-    /// Changes one box.
+    /// Changes one box, and those around it that have been raised.
     pub(crate) fn set(&mut self, slot: usize, corners: Corners) {
         let (mut item, mut corners) = (slot, corners);
         for level in 0..self.levels() {
-            let pack = &mut self.packs[self.starts[level] as usize + item / LANES];
+            let Some(pack) = self.packs.get_mut(self.starts[level] as usize + item / LANES) else { return };
             if pack.get(item % LANES) == corners {
                 return;
             }
@@ -283,31 +367,32 @@ impl PackedBoxes {
     }
 }
 
-/// Numbers of points in the order of a space-filling curve through the box around them; of points in one cell of the
-/// curve the first comes first.
+/// A space-filling curve through a box.
 ///
-/// The curve is Morton's: 21 bits of each coordinate, interleaved.
-pub(crate) fn curve_order(points: &[Vec3]) -> Vec<u32> {
-    let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for &point in points {
-        min = min.min(point);
-        max = max.max(point);
+/// The curve is Morton's: 21 bits of each coordinate, interleaved. What lies outside counts as at the nearest face.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Curve {
+    min: Vec3,
+    scale: f32,
+}
+
+impl Curve {
+    /// A curve through the cube around points, made wider by a factor around its middle.
+    pub(crate) fn around(points: impl Iterator<Item = Vec3>, wider: f32) -> Self {
+        let around = |(min, max): Corners, point: Vec3| (min.min(point), max.max(point));
+        let (min, max) = points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), around);
+        let largest = ((1u32 << KEY_BITS) - 1) as f32;
+        // Points that coincide, and no points, have one cell.
+        let size = wider * (max - min).max_element();
+        if size > 0.0 { Self { min: min.midpoint(max) - 0.5 * size, scale: largest / size } } else { Self::default() }
     }
-    let largest = ((1u32 << KEY_BITS) - 1) as f32;
-    // Points that coincide, and no points, have one cell.
-    let size = (max - min).max_element();
-    let scale = if size > 0.0 { largest / size } else { 0.0 };
-    let mut keys: Vec<(u64, u32)> = points
-        .iter()
-        .enumerate()
-        .map(|(number, &point)| {
-            // The cast saturates.
-            let cell = ((point - min) * scale).as_uvec3().to_array().map(spread);
-            (cell[0] | cell[1] << 1 | cell[2] << 2, number as u32)
-        })
-        .collect();
-    keys.sort_unstable();
-    keys.into_iter().map(|(_, number)| number).collect()
+
+    /// Where on the curve a point is.
+    pub(crate) fn key(&self, point: Vec3) -> u64 {
+        // The cast saturates.
+        let cell = ((point - self.min) * self.scale).as_uvec3().to_array().map(spread);
+        cell[0] | cell[1] << 1 | cell[2] << 2
+    }
 }
 
 /// Moves the lowest 21 bits apart, two zeros between each two.
@@ -341,13 +426,17 @@ mod tests {
     fn curve_passes_octant_by_octant() {
         let corners: Vec<Vec3> =
             (0..64u8).rev().map(|i| Vec3::new(f32::from(i & 3), f32::from(i >> 2 & 3), f32::from(i >> 4))).collect();
-        let octant = |number: u32| (corners[number as usize] / 2.0).as_uvec3();
-        let order = curve_order(&corners);
-        for eight in order.chunks(8) {
-            assert!(eight.iter().all(|&number| octant(number) == octant(eight[0])));
+        for wider in [1.0, 4.0] {
+            let curve = Curve::around(corners.iter().copied(), wider);
+            let mut order = corners.clone();
+            order.sort_by_key(|&corner| curve.key(corner));
+            for eight in order.chunks(8) {
+                assert!(eight.iter().all(|corner| (corner / 2.0).as_uvec3() == (eight[0] / 2.0).as_uvec3()));
+            }
         }
-        assert_eq!(curve_order(&[Vec3::ONE; 3]), [0, 1, 2]);
-        assert!(curve_order(&[]).is_empty());
+        let point = Curve::around([Vec3::ONE; 3].into_iter(), 1.0);
+        assert_eq!(point.key(Vec3::ONE), Curve::default().key(Vec3::NEG_ONE));
+        assert_eq!(Curve::around(std::iter::empty(), 1.0).key(Vec3::ONE), 0);
     }
 
     #[test]

@@ -233,6 +233,38 @@ fn links_may_come_and_go() {
 }
 
 #[test]
+fn trees_that_change_are_solved_as_new_ones() {
+    for seed in 0..10 {
+        let mut rng = rng(seed);
+        let mut organ = organ(&mut rng, 90, 2.0);
+        organ.circulation.solve().unwrap();
+        for (side, tree) in organ.trees.iter_mut().enumerate() {
+            // Half the vessels widen, and one more grows.
+            let last = tree.len() as u32 - 1;
+            let positions = [tree.positions(), &[tree.positions()[last as usize] + 0.5]].concat();
+            let parents = [tree.parents(), &[last]].concat();
+            let radii = (0..=last as usize).map(|node| tree.radii()[node] * (1.0 + 0.2 * (node % 2) as f32));
+            let radii = radii.chain([0.01]).collect();
+            *tree = VesselTree::from_arrays(positions, parents, radii).unwrap();
+            let network = if side == 0 { organ.circulation.arterial_mut() } else { organ.circulation.venous_mut() };
+            assert_eq!(network.update(tree).unwrap().appended, 1);
+        }
+        organ.circulation.solve().unwrap();
+        let mut venous = resisting(2.0);
+        venous.root = RootPressure::Constant(Pressure::from_mmhg(4.0));
+        let [arterial, venous] = [(0, resisting(2.0)), (1, venous)]
+            .map(|(side, settings): (usize, _)| Network::new(&organ.trees[side], settings).unwrap());
+        let mut anew = Circulation::new(arterial, venous, &organ.links).unwrap();
+        anew.solve().unwrap();
+        let flows = [&organ.circulation, &anew].map(|both| [both.arterial().flows(), both.venous().flows()].concat());
+        let largest = flows[1].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        for (node, (found, expected)) in flows[0].iter().zip(&flows[1]).enumerate() {
+            assert!((found - expected).abs() < 1e-8 * largest, "seed {seed}, {node}: {found}, not {expected}");
+        }
+    }
+}
+
+#[test]
 fn a_clamped_artery_leaves_the_vein_to_the_pool() {
     let tree = super::trees::tube(4, 4.0, 0.2);
     let mut venous = resisting(1.0);

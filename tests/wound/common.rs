@@ -3,6 +3,7 @@
 use bevy_math::{Vec3, vec3};
 use bevy_vessels::synthesis::rng::{Stream, VesselRng};
 use bevy_vessels::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
+use bevy_vessels::synthesis::wound::Region;
 use rand::RngExt;
 
 pub fn rng(seed: u64) -> VesselRng {
@@ -45,8 +46,8 @@ pub fn random_point(rng: &mut VesselRng) -> Vec3 {
     vec3(coordinate(), coordinate(), coordinate())
 }
 
-/// Candidates for any box: every node, roots included, the last first.
-pub fn all(tree: &VesselTree) -> impl Fn(Vec3, Vec3, &mut dyn FnMut(NodeId)) + Copy {
+/// Candidates for any region: every node, roots included, the last first.
+pub fn all(tree: &VesselTree) -> impl Fn(&Region, &mut dyn FnMut(NodeId)) + Copy {
     let nodes = tree.len() as u32;
-    move |_, _, visit| (0..nodes).rev().for_each(|node| visit(NodeId(node)))
+    move |_, visit| (0..nodes).rev().for_each(|node| visit(NodeId(node)))
 }

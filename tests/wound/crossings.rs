@@ -4,7 +4,7 @@ use crate::common::{all, forest, random_point, rng};
 use bevy_math::{Affine3A, DAffine3, DMat3, DVec3, Mat3, Quat, Vec3};
 use bevy_vessels::synthesis::rng::VesselRng;
 use bevy_vessels::synthesis::tree::VesselTree;
-use bevy_vessels::synthesis::wound::{Blade, BladeError, Severed, severed};
+use bevy_vessels::synthesis::wound::{Blade, BladeError, Region, Severed, severed};
 use rand::RngExt;
 
 /// A blade as the twin knows it, in world space.
@@ -194,8 +194,9 @@ fn the_box_that_an_index_is_asked_for_holds_every_crossing() {
         let local = blade.to_local(&to_world).unwrap();
         let (mut by_all, mut by_box) = (Vec::new(), Vec::new());
         severed(&local, &tree, all(&tree), &mut by_all);
-        let boxed = |min: Vec3, max: Vec3, visit: &mut dyn FnMut(_)| {
-            all(&tree)(min, max, &mut |node| {
+        let boxed = |region: &Region, visit: &mut dyn FnMut(_)| {
+            let (min, max) = (region.min(), region.max());
+            all(&tree)(region, &mut |node| {
                 let end = tree.positions()[node.index()];
                 let start = tree.parent(node).map_or(end, |parent| tree.positions()[parent.index()]);
                 if start.min(end).cmple(max).all() && start.max(end).cmpge(min).all() {

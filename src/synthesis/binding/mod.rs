@@ -13,8 +13,10 @@
 //! Nothing is known of cuts either. A [`Place`](crate::synthesis::tree::Place) on a segment moves with the segment's
 //! ends, so what was cut stays cut at the same spot of the vessel.
 
+mod frames;
 mod surface;
 mod tetrahedra;
+mod vertices;
 
 pub use tetrahedra::{TetMesh, TetMeshError};
 
@@ -23,9 +25,9 @@ use bevy_math::Vec3;
 use surface::SurfaceBonds;
 use tetrahedra::SolidBonds;
 
-/// Fewest nodes worth handing to another thread.
+/// Fewest triangles, or fours of nodes, worth handing to another thread.
 #[cfg(feature = "parallel")]
-const WORTH_SHARING: usize = 4096;
+const WORTH_SHARING: usize = 2048;
 
 /// Why nodes could not follow. Nothing has been moved then.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -63,7 +65,7 @@ pub enum BindingError {
 /// The nodes of one tree, bound to one organ.
 ///
 /// It keeps the organ at rest, so that nodes which grow later can be bound: growth goes on at rest, and what follows is
-/// a copy of the positions. Memory: 32 bytes a node, and about 150 bytes a triangle or tetrahedron.
+/// a copy of the positions. Memory: 32 bytes a node, and about 200 bytes a triangle or tetrahedron.
 #[derive(Clone, Debug)]
 pub struct Binding {
     bonds: Bonds,
@@ -71,7 +73,7 @@ pub struct Binding {
 
 #[derive(Clone, Debug)]
 enum Bonds {
-    Surface(SurfaceBonds),
+    Surface(Box<SurfaceBonds>),
     Solid(SolidBonds),
 }
 
@@ -81,7 +83,7 @@ impl Binding {
     /// Of equally near triangles the first counts; degenerate ones are left out. Vertices at the same position count as
     /// one for normals, so that seams don't show.
     pub fn to_surface(tree: &VesselTree, mesh: &TriangleMesh) -> Self {
-        let mut binding = Self { bonds: Bonds::Surface(SurfaceBonds::new(mesh)) };
+        let mut binding = Self { bonds: Bonds::Surface(Box::new(SurfaceBonds::new(mesh))) };
         binding.extend(tree);
         binding
     }
@@ -176,19 +178,19 @@ impl Binding {
     }
 }
 
-/// Fills `outputs` with `map` of each input, on all threads where that pays.
-fn map_all<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], map: impl Fn(&I) -> O + Sync) {
-    let fill = |outputs: &mut [O], inputs: &[I]| {
-        for (output, input) in outputs.iter_mut().zip(inputs) {
-            *output = map(input);
+/// Fills `outputs` with `map` of each index and input, on all threads where that pays.
+fn map_all<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], map: impl Fn(usize, &I) -> O + Sync) {
+    let fill = |first: usize, outputs: &mut [O], inputs: &[I]| {
+        for (index, (output, input)) in (first..).zip(outputs.iter_mut().zip(inputs)) {
+            *output = map(index, input);
         }
     };
     #[cfg(feature = "parallel")]
     if inputs.len() >= 2 * WORTH_SHARING && rayon::current_num_threads() > 1 {
         use rayon::prelude::*;
-        let shares = outputs.par_chunks_mut(WORTH_SHARING).zip(inputs.par_chunks(WORTH_SHARING));
-        shares.for_each(|(outputs, inputs)| fill(outputs, inputs));
+        let shares = outputs.par_chunks_mut(WORTH_SHARING).zip(inputs.par_chunks(WORTH_SHARING)).enumerate();
+        shares.for_each(|(share, (outputs, inputs))| fill(share * WORTH_SHARING, outputs, inputs));
         return;
     }
-    fill(outputs, inputs);
+    fill(0, outputs, inputs);
 }

@@ -1,11 +1,15 @@
 //! Nodes bound to triangles.
 
-use super::map_all;
+use super::{
+    frames::{Frames, LANES, Vectors},
+    map_all,
+    vertices::{Vertex, Vertices},
+};
 use crate::synthesis::{
-    mesh::{TriangleMesh, Welding, doubled_normal, unit},
+    mesh::{TriangleMesh, doubled_normal, unit},
     tissue::TriangleIndex,
 };
-use bevy_math::{DVec3, Vec3};
+use bevy_math::{Vec3, Vec3A, Vec4};
 
 /// Length of an offset, relative to the size of the coordinates, below which a node lies on the surface: a few
 /// roundings. Such nodes need no frame.
@@ -25,75 +29,87 @@ struct Bond {
     offset: Vec3,
 }
 
-/// An organ's vertices, with the normal of each.
-#[derive(Clone, Copy)]
-struct Pose<'a> {
-    vertices: &'a [Vec3],
-    normals: &'a [Vec3],
+impl Bond {
+    /// The point of the triangle that the weights stand for.
+    #[inline]
+    fn point(&self, vertices: &[Vertex]) -> Vec3A {
+        let [a, b, c] = self.corners.map(|corner| vertices[corner as usize].position);
+        a + (b - a) * self.weights[0] + (c - a) * self.weights[1]
+    }
+
+    fn edge(&self, vertices: &[Vertex]) -> Vec3A {
+        vertices[self.corners[1] as usize].position - vertices[self.corners[0] as usize].position
+    }
+
+    /// The interpolated normal at any length.
+    #[inline]
+    fn normal(&self, vertices: &[Vertex]) -> Vec3A {
+        let [a, b, c] = self.corners.map(|corner| vertices[corner as usize].normal);
+        let [v, w] = self.weights;
+        a * (1.0 - v - w) + b * v + c * w
+    }
+
+    /// Unit normal of the triangle itself, zero where it has no area.
+    #[cold]
+    fn normal_of_triangle(&self, vertices: &[Vertex]) -> Vec3A {
+        unit(doubled_normal(self.corners.map(|corner| vertices[corner as usize].position.into()))).into()
+    }
 }
 
-impl Pose<'_> {
-    /// The point of a triangle that weights stand for.
-    fn point(&self, corners: [u32; 3], [v, w]: [f32; 2]) -> Vec3 {
-        let [a, b, c] = corners.map(|corner| self.vertices[corner as usize]);
-        a + (b - a) * v + (c - a) * w
+/// The frames at the points of four bonds. `scale` brings the organ's coordinates near 1.
+#[inline]
+fn frames(bonds: &[Bond; LANES], vertices: &[Vertex], scale: f32) -> Frames {
+    let edges = Vectors::from(bonds.each_ref().map(|bond| bond.edge(vertices))).times(Vec4::splat(scale));
+    let normals = Vectors::from(bonds.each_ref().map(|bond| bond.normal(vertices)));
+    if normals.dot(normals).min_element() > CANCELLED {
+        return Frames::new(edges, normals);
     }
+    let normal = |bond: &Bond| {
+        let normal = bond.normal(vertices);
+        if normal.length_squared() > CANCELLED { normal } else { bond.normal_of_triangle(vertices) }
+    };
+    Frames::new(edges, bonds.each_ref().map(normal).into())
+}
 
-    /// Unit normal, interpolated; the triangle's own where those of its corners cancel out.
-    fn normal(&self, corners: [u32; 3], [v, w]: [f32; 2]) -> Vec3 {
-        let [a, b, c] = corners.map(|corner| self.normals[corner as usize]);
-        let mixed = a * (1.0 - v - w) + b * v + c * w;
-        if mixed.length_squared() > CANCELLED {
-            mixed.normalize()
-        } else {
-            unit(doubled_normal(corners.map(|corner| self.vertices[corner as usize])))
-        }
+/// Where four nodes are.
+#[inline]
+fn nodes(bonds: &[Bond; LANES], vertices: &[Vertex], scale: f32) -> [Vec3; LANES] {
+    let points = bonds.each_ref().map(|bond| bond.point(vertices));
+    if bonds.iter().all(|bond| bond.offset == Vec3::ZERO) {
+        return points.map(Vec3::from);
     }
-
-    /// Part of the first edge across a normal, at any length.
-    fn edge_across(&self, corners: [u32; 3], normal: Vec3) -> Vec3 {
-        let edge = self.vertices[corners[1] as usize] - self.vertices[corners[0] as usize];
-        edge - normal * normal.dot(edge)
-    }
-
-    /// A node's offset in space.
-    fn offset(&self, bond: &Bond) -> Vec3 {
-        let normal = self.normal(bond.corners, bond.weights);
-        let tangent = self.edge_across(bond.corners, normal).normalize_or_zero();
-        tangent * bond.offset.x + normal.cross(tangent) * bond.offset.y + normal * bond.offset.z
-    }
-
-    fn position(&self, bond: &Bond) -> Vec3 {
-        let point = self.point(bond.corners, bond.weights);
-        if bond.offset == Vec3::ZERO { point } else { point + self.offset(bond) }
-    }
+    let Frames { along, across, up } = frames(bonds, vertices, scale);
+    let lanes = |axis: usize| Vec4::from_array(bonds.each_ref().map(|bond| bond.offset[axis]));
+    let offsets = along.times(lanes(0)).plus(across.times(lanes(1))).plus(up.times(lanes(2)));
+    let offsets = <[Vec3A; LANES]>::from(offsets);
+    std::array::from_fn(|lane| Vec3::from(points[lane] + offsets[lane]))
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct SurfaceBonds {
     mesh: TriangleMesh,
     index: TriangleIndex,
-    welding: Welding,
-    rest_normals: Vec<Vec3>,
+    measured: Vertices,
+    rest: Vec<Vertex>,
+    /// Brings coordinates at rest near 1.
+    rest_scale: f32,
     bonds: Vec<Bond>,
-    /// Of each vertex, as it was last followed.
-    normals: Vec<Vec3>,
-    /// Of each welded vertex, while normals are computed.
-    sums: Vec<DVec3>,
+    /// As they were last followed.
+    vertices: Vec<Vertex>,
 }
 
 impl SurfaceBonds {
     pub fn new(mesh: &TriangleMesh) -> Self {
-        let welding = mesh.weld();
-        let normals = mesh.vertex_normals_with(&welding);
+        let (mut measured, mut rest) = (Vertices::new(mesh), Vec::new());
+        let rest_scale = measured.measure(mesh.positions(), &mut rest);
         Self {
             index: TriangleIndex::new(mesh),
             mesh: mesh.clone(),
-            sums: Vec::new(),
-            welding,
-            rest_normals: normals.clone(),
+            measured,
             bonds: Vec::new(),
-            normals,
+            vertices: rest.clone(),
+            rest,
+            rest_scale,
         }
     }
 
@@ -102,61 +118,53 @@ impl SurfaceBonds {
     }
 
     pub fn vertices(&self) -> usize {
-        self.mesh.positions().len()
+        self.rest.len()
     }
 
     /// Binds the nodes from a number on.
     pub fn bind(&mut self, from: usize, nodes: &[Vec3]) {
         self.bonds.truncate(from);
-        let pose = Pose { vertices: self.mesh.positions(), normals: &self.rest_normals };
         for &node in &nodes[from..] {
             let found = self.index.closest(node).expect("nodes are finite, and a mesh has a triangle with an area");
-            let bond = bond(&pose, self.mesh.triangles()[found.triangle], found.barycentric, node);
+            let bond =
+                bond(&self.rest, self.rest_scale, self.mesh.triangles()[found.triangle], found.barycentric, node);
             self.bonds.push(bond);
         }
     }
 
-    pub fn follow(&mut self, vertices: &[Vec3], positions: &mut [Vec3]) {
-        self.measure_normals(vertices);
-        let pose = Pose { vertices, normals: &self.normals };
-        map_all(&self.bonds, positions, |bond| pose.position(bond));
+    pub fn follow(&mut self, positions: &[Vec3], moved: &mut [Vec3]) {
+        let scale = self.measured.measure(positions, &mut self.vertices);
+        let vertices = &self.vertices;
+        let (bonds, rest) = self.bonds.as_chunks::<LANES>();
+        let (fours, others) = moved.as_chunks_mut::<LANES>();
+        map_all(bonds, fours, |_, bonds| nodes(bonds, vertices, scale));
+        if let Some(&last) = rest.last() {
+            let bonds = std::array::from_fn(|lane| *rest.get(lane).unwrap_or(&last));
+            others.copy_from_slice(&nodes(&bonds, vertices, scale)[..others.len()]);
+        }
     }
 
     pub fn normal(&self, node: usize) -> Vec3 {
-        let Bond { corners, weights: [v, w], .. } = self.bonds[node];
-        let [a, b, c] = corners.map(|corner| self.normals[corner as usize]);
-        (a * (1.0 - v - w) + b * v + c * w).normalize_or_zero()
-    }
-
-    /// As [`TriangleMesh::vertex_normals_with`], in buffers that stay.
-    fn measure_normals(&mut self, vertices: &[Vec3]) {
-        self.sums.clear();
-        self.sums.resize(self.welding.count(), DVec3::ZERO);
-        for corners in self.mesh.triangles() {
-            let normal = doubled_normal(corners.map(|corner| vertices[corner as usize]));
-            for &corner in corners {
-                self.sums[self.welding.vertex(corner)] += normal;
-            }
-        }
-        for (vertex, normal) in self.normals.iter_mut().enumerate() {
-            *normal = unit(self.sums[self.welding.vertex(vertex as u32)]);
-        }
+        self.bonds[node].normal(&self.vertices).normalize_or_zero().into()
     }
 }
 
 /// Binds a node to a triangle, at the point of it with three weights.
-fn bond(pose: &Pose, [a, b, c]: [u32; 3], weights: Vec3, node: Vec3) -> Bond {
-    let turns =
-        [([a, b, c], [weights.y, weights.z]), ([b, c, a], [weights.z, weights.x]), ([c, a, b], [weights.x, weights.y])];
-    let normal = pose.normal(turns[0].0, turns[0].1);
-    let across = |corners| pose.edge_across(corners, normal).length_squared();
-    let (corners, weights) =
-        turns.into_iter().max_by(|x, y| across(x.0).total_cmp(&across(y.0))).expect("there are three turns");
+fn bond(vertices: &[Vertex], scale: f32, [a, b, c]: [u32; 3], weights: Vec3, node: Vec3) -> Bond {
+    let turn = |corners, weights| Bond { corners, weights, offset: Vec3::ZERO };
+    let turns = [
+        turn([a, b, c], [weights.y, weights.z]),
+        turn([b, c, a], [weights.z, weights.x]),
+        turn([c, a, b], [weights.x, weights.y]),
+    ];
+    let normal = <[Vec3A; LANES]>::from(frames(&[turns[0]; LANES], vertices, scale).up)[0];
+    let across = |bond: &Bond| bond.edge(vertices).reject_from_normalized(normal).length_squared();
+    let mut bond = turns.into_iter().max_by(|x, y| across(x).total_cmp(&across(y))).expect("there are three turns");
     // Measured from the point that following begins from, so that its rounding cancels out.
-    let normal = pose.normal(corners, weights);
-    let tangent = pose.edge_across(corners, normal).normalize_or_zero();
-    let away = node - pose.point(corners, weights);
-    let on_surface = away.length() <= ON_SURFACE * node.abs().max_element();
-    let offset = Vec3::new(away.dot(tangent), away.dot(normal.cross(tangent)), away.dot(normal));
-    Bond { corners, weights, offset: if on_surface { Vec3::ZERO } else { offset } }
+    let away = Vec3A::from(node) - bond.point(vertices);
+    if away.length() > ON_SURFACE * node.abs().max_element() {
+        let Frames { along, across, up } = frames(&[bond; LANES], vertices, scale);
+        bond.offset = Vec3::from_array([along, across, up].map(|axis| away.dot(<[Vec3A; LANES]>::from(axis)[0])));
+    }
+    bond
 }

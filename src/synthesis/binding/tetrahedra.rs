@@ -202,7 +202,7 @@ impl SolidBonds {
     }
 
     pub fn follow(&self, vertices: &[Vec3], positions: &mut [Vec3]) {
-        map_all(&self.bonds, positions, |bond| {
+        map_all(&self.bonds, positions, |_, bond| {
             let [a, b, c, d] = bond.corners.map(|corner| vertices[corner as usize]);
             a + (b - a) * bond.weights.x + (c - a) * bond.weights.y + (d - a) * bond.weights.z
         });

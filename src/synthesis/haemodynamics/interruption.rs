@@ -96,6 +96,7 @@ impl Network {
             (Ok(at), None) => _ = self.interruptions.remove(at),
             (Err(_), None) => {}
         }
+        self.revision += 1;
         self.links[slot].upstream = if interruption.is_some() { REFERENCE } else { parent };
         self.slots[slot].resistance = if interruption.is_some() { CLOSED } else { self.whole_resistance(node.index()) };
         self.replace_ends(node, interruption);

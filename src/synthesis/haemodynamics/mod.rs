@@ -44,6 +44,7 @@ mod interruption;
 mod joined;
 mod network;
 mod open_ends;
+mod quotient;
 mod settings;
 mod skeleton;
 mod solution;

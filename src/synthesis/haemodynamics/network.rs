@@ -110,6 +110,8 @@ pub struct Network {
     /// Whether `below` and `through` have to be summed again from all tips.
     pub(super) sums_stale: bool,
     pub(super) path: Vec<u32>,
+    /// Rises with every change of the tree, its gaps and what its nodes drain into.
+    pub(super) revision: u64,
 }
 
 impl Network {
@@ -138,6 +140,7 @@ impl Network {
             flows: Vec::new(),
             sums_stale: true,
             path: Vec::new(),
+            revision: 0,
         };
         network.clear();
         network.set_root_pressure(network.settings.root.mean())?;
@@ -176,6 +179,7 @@ impl Network {
         let appended = tree.len() - before;
         if changed + appended > 0 {
             self.sums_stale = true;
+            self.revision += 1;
             self.measure_ends();
         }
         Ok(NetworkUpdate { appended, changed, replaced: false })
@@ -225,6 +229,7 @@ impl Network {
         self.pressures.resize(tree.len(), 0.0);
         self.flows.resize(tree.len(), 0.0);
         self.sums_stale = true;
+        self.revision += 1;
     }
 
     /// Length of a segment in metres, 0 for a root.

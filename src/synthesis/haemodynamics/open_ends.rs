@@ -46,7 +46,7 @@ pub struct OpenEnd {
     /// The joint of the skeleton at the node.
     joint: u32,
     /// What the end draws from the node, as of the last solution.
-    stump: Shunt,
+    pub(super) stump: Shunt,
 }
 
 impl OpenEnd {

@@ -15,15 +15,15 @@ const NONE: u32 = u32::MAX;
 
 /// A node where an open end is attached, where paths meet, or where a path begins.
 #[derive(Clone, Copy, Debug)]
-struct Joint {
+pub(super) struct Joint {
     /// The next joint towards the root, or none.
     above: u32,
     /// Whether it is a root, held at the root pressure.
-    is_root: bool,
+    pub is_root: bool,
     /// Bed, links and whole subtrees that hang off it.
-    hanging: Shunt,
+    pub hanging: Shunt,
     /// The run of segments to the joint above.
-    run: Run,
+    pub run: Run,
     /// `hanging`, the open ends and the joints below, in the solution.
     below: Shunt,
     pressure: f64,
@@ -31,10 +31,17 @@ struct Joint {
 
 /// A run of segments as a conductance with a shunt at each end.
 #[derive(Clone, Copy, Debug, Default)]
-struct Run {
-    upper: Shunt,
-    through: f64,
-    lower: Shunt,
+pub(super) struct Run {
+    pub upper: Shunt,
+    pub through: f64,
+    pub lower: Shunt,
+}
+
+impl Joint {
+    /// The next joint towards the root.
+    pub fn above(&self) -> Option<u32> {
+        (self.above != NONE).then_some(self.above)
+    }
 }
 
 impl Run {
@@ -166,6 +173,11 @@ impl Skeleton {
             child = link.next_sibling;
         }
         hanging
+    }
+
+    /// All joints, below before above.
+    pub fn joints(&self) -> &[Joint] {
+        &self.joints
     }
 
     /// All slots on the paths, below before above.

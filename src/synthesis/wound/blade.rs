@@ -8,6 +8,7 @@
 //! they were given in and are asked there, so a ball stays a ball of the world under non-uniform scale, mirrors and
 //! shears.
 
+use super::region::{Region, axes};
 use bevy_math::{Affine3A, DAffine3, DMat3, DVec3, Vec3};
 
 /// Why a blade cannot cut.
@@ -206,23 +207,33 @@ impl Blade {
         Ok(Self { shape })
     }
 
-    /// Calls `visit(box, part)` for parts that make up the blade.
+    /// Calls `visit(region, part)` for parts that make up the blade.
     ///
     /// Triangles come in pairs, so that what asks an index for each part asks once for a swept edge.
-    pub(super) fn parts(&self, mut visit: impl FnMut([Vec3; 2], Part)) {
+    pub(super) fn parts(&self, mut visit: impl FnMut(&Region, Part)) {
         match &self.shape {
             Shape::Triangles(triangles) => {
                 for pair in triangles.chunks(2) {
-                    let corners = pair.as_flattened();
-                    let min = corners.iter().copied().fold(Vec3::INFINITY, Vec3::min);
-                    let max = corners.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
-                    visit([min, max], Part::Triangles(pair));
+                    visit(&region_of(pair), Part::Triangles(pair));
                 }
             }
-            Shape::Disc(disc) => visit(disc.bounds(), Part::Disc(disc)),
-            Shape::Volume(volume) => visit(volume.bounds(), Part::Volume(volume)),
+            Shape::Disc(disc) => visit(&disc.region(), Part::Disc(disc)),
+            Shape::Volume(volume) => visit(&volume.region(), Part::Volume(volume)),
         }
     }
+}
+
+/// The region of some triangles: across their plane, and along their longest edge.
+fn region_of(triangles: &[[Vec3; 3]]) -> Region {
+    let normal = |&[a, b, c]: &[Vec3; 3]| (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3());
+    let edges =
+        triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).map(|(a, b)| b.as_dvec3() - a.as_dvec3());
+    let longest = |a: DVec3, b: DVec3| if b.length_squared() > a.length_squared() { b } else { a };
+    let [normal, along] = [triangles.iter().map(normal).fold(DVec3::ZERO, longest), edges.fold(DVec3::ZERO, longest)];
+    Region::of(axes(normal, along), |axis| {
+        let along = triangles.as_flattened().iter().map(|corner| corner.as_dvec3().dot(axis));
+        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], along| [low.min(along), high.max(along)])
+    })
 }
 
 /// What one question to an index serves.
@@ -254,41 +265,42 @@ impl Frame {
         Self { inward: self.inward * next.inward, outward: next.outward * self.outward }
     }
 
-    /// The box, in the present space, around a ball of the shape's space. `flat`: the normal of a disc instead.
-    fn bounds(&self, center: DVec3, radius: f64, flat: DVec3) -> [DVec3; 2] {
-        let rows = self.outward.matrix3.transpose();
-        let reach = |row: DVec3| {
-            let along = row.dot(flat);
-            radius * (row.length_squared() - along * along).max(0.0).sqrt()
-        };
-        let half = DVec3::new(reach(rows.x_axis), reach(rows.y_axis), reach(rows.z_axis));
+    /// How far, along an axis of the present space, a ball of the shape's space extends. `flat`: the normal of a disc
+    /// instead.
+    fn reach(&self, center: DVec3, radius: f64, flat: DVec3, axis: DVec3) -> [f64; 2] {
+        let row = self.outward.matrix3.transpose() * axis;
+        let along = row.dot(flat);
+        let half = radius * (row.length_squared() - along * along).max(0.0).sqrt();
         let center = self.outward.transform_point3(center);
         // More than the rounding of what led here.
-        let half = half + ROUNDING * (half + center.abs() + self.outward.translation.abs());
+        let half = half + ROUNDING * (half + (center.abs() + self.outward.translation.abs()).dot(axis.abs()));
+        let center = center.dot(axis);
         [center - half, center + half]
     }
 }
 
-/// Share by which boxes around curved shapes are widened against rounding in f64.
+/// Share by which regions of curved shapes are widened against rounding in f64.
 const ROUNDING: f64 = 1e-12;
 
 impl Disc {
-    fn bounds(&self) -> [Vec3; 2] {
-        outwards(self.frame.bounds(self.center, self.radius, self.normal))
+    fn region(&self) -> Region {
+        let Self { center, normal, radius, frame } = self;
+        // Normals go the way of planes.
+        let plane = frame.inward.matrix3.transpose() * *normal;
+        Region::of(axes(plane, plane.any_orthogonal_vector()), |axis| frame.reach(*center, *radius, *normal, axis))
     }
 }
 
 impl Volume {
-    fn bounds(&self) -> [Vec3; 2] {
-        let [a, b] = self.frame.bounds(self.from, self.radius, DVec3::ZERO);
-        let [c, d] = self.frame.bounds(self.to, self.radius, DVec3::ZERO);
-        outwards([a.min(c), b.max(d)])
+    fn region(&self) -> Region {
+        let Self { from, to, radius, frame } = self;
+        let along = frame.outward.transform_vector3(*to - *from);
+        Region::of(axes(along, along.any_orthogonal_vector()), |axis| {
+            let [a, b] = frame.reach(*from, *radius, DVec3::ZERO, axis);
+            let [c, d] = frame.reach(*to, *radius, DVec3::ZERO, axis);
+            [a.min(c), b.max(d)]
+        })
     }
-}
-
-/// A box rounded to f32 so that it becomes no smaller.
-fn outwards([min, max]: [DVec3; 2]) -> [Vec3; 2] {
-    [min.as_vec3().map(f32::next_down), max.as_vec3().map(f32::next_up)]
 }
 
 fn has_area(&[a, b, c]: &[Vec3; 3]) -> bool {

@@ -21,6 +21,7 @@
 //! rounding. For curved shapes it is a sign in f64 that depends on the node alone, or, between two nodes on the same
 //! side, on a root in f64. Both ways neighbours agree about the node that they share.
 
+use super::Region;
 use super::blade::{Blade, Disc, Part, Volume};
 use super::orientation::orientation;
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
@@ -44,17 +45,17 @@ pub struct Severed {
 
 /// Collects in `found`, which is cleared, what a blade severs: in the order of the nodes, then from parent to node.
 ///
-/// The blade is in the tree's space. `candidates(min, max, visit)` calls `visit` with at least the nodes whose segments
-/// meet the box; any others, and repeated ones, change nothing.
+/// The blade is in the tree's space. `candidates(region, visit)` calls `visit` with at least the nodes whose segments
+/// meet the region; any others, and repeated ones, change nothing.
 pub fn severed(
     blade: &Blade,
     tree: &VesselTree,
-    mut candidates: impl FnMut(Vec3, Vec3, &mut dyn FnMut(NodeId)),
+    mut candidates: impl FnMut(&Region, &mut dyn FnMut(NodeId)),
     found: &mut Vec<Severed>,
 ) {
     found.clear();
-    blade.parts(|[min, max], part| {
-        candidates(min, max, &mut |node| {
+    blade.parts(|region, part| {
+        candidates(region, &mut |node| {
             if let Some([parent, end]) = segment(tree, node) {
                 sever(part, node, parent, end, found);
             }

@@ -23,11 +23,11 @@
 //! ```
 //! use bevy_math::Vec3;
 //! use bevy_vessels::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
-//! use bevy_vessels::synthesis::wound::{Blade, EndSide, Retraction, Wounds};
+//! use bevy_vessels::synthesis::wound::{Blade, EndSide, Region, Retraction, Wounds};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let tree = VesselTree::from_arrays(vec![Vec3::ZERO, 4.0 * Vec3::X], vec![NO_PARENT, 0], vec![0.1; 2])?;
-//! let every_segment = |_: Vec3, _: Vec3, visit: &mut dyn FnMut(NodeId)| visit(NodeId(1));
+//! let every_segment = |_: &Region, visit: &mut dyn FnMut(NodeId)| visit(NodeId(1));
 //! let mut wounds = Wounds::new(Retraction { radii: 2.0, length: 0.0 })?;
 //!
 //! let scalpel = Blade::sweep([-Vec3::Y - Vec3::Z, -Vec3::Y + Vec3::Z], [Vec3::Y - Vec3::Z, Vec3::Y + Vec3::Z])?;
@@ -51,10 +51,12 @@ mod error;
 mod injury;
 pub mod ischaemia;
 mod orientation;
+mod region;
 mod report;
 mod retraction;
 mod round_cone;
 mod segment_index;
+mod segment_run;
 mod stumps;
 mod wounds;
 
@@ -66,6 +68,7 @@ pub use clotting::Clotting;
 pub use crossing::{Severed, severed};
 pub use error::WoundError;
 pub use ischaemia::{Supply, TissueSupply};
+pub use region::Region;
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
 pub use retraction::Retraction;
 pub use segment_index::SegmentIndex;

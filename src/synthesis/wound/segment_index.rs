@@ -4,60 +4,22 @@
 //! Out: end nodes of segments, or a [`Place`] on one.
 //!
 //! Nodes lie in the order of their birth, and what is born together is spread over the whole organ. So the index is a
-//! row of runs, each the packed boxes of consecutive nodes, sorted along a space-filling curve. New nodes make a run,
-//! and while the run before it is less than twice as long the two become one: runs at least halve from each to the next, so a tree
-//! of n nodes has at most log₂ n of them, and a node is sorted anew log₂ n times at most while its tree grows.
+//! row of runs, each the packed boxes of consecutive nodes, sorted along a space-filling curve. New nodes make a run. A
+//! run less than twice as long as the next is merged with that: at once while both are short, otherwise a few steps in
+//! each call, in proportion to the new nodes (Overmars & van Leeuwen, "Worst-case optimal insertion and deletion methods
+//! for decomposable searching problems", Inf. Process. Lett. 12, 1981). So there are never many runs, and no call takes
+//! long.
 
-use super::round_cone::{RoundCone, box_around};
+use super::{
+    Region,
+    round_cone::RoundCone,
+    segment_run::{Run, box_of, curve_through},
+};
 use crate::synthesis::{
-    packed_boxes::{PackedBoxes, Ray, curve_order},
-    tree::{NO_PARENT, NodeId, Place, VesselTree},
+    packed_boxes::{Curve, Pack, Ray},
+    tree::{NodeId, Place, VesselTree},
 };
 use bevy_math::Vec3;
-use std::ops::Range;
-
-/// In place of a slot: a root, which has no segment.
-const NONE: u32 = u32::MAX;
-
-/// The segments of consecutive nodes.
-#[derive(Clone, Debug)]
-struct Run {
-    nodes: Range<u32>,
-    /// End node of each slot of `boxes`.
-    ends: Vec<u32>,
-    /// Slot of each node, [`NONE`] for a root.
-    slots: Vec<u32>,
-    boxes: PackedBoxes,
-}
-
-impl Run {
-    fn new(tree: &VesselTree, nodes: Range<u32>) -> Self {
-        let mut ends: Vec<u32> = nodes.clone().filter(|&node| tree.parents()[node as usize] != NO_PARENT).collect();
-        let middles: Vec<Vec3> = ends
-            .iter()
-            .map(|&node| {
-                let parent = tree.parents()[node as usize];
-                tree.positions()[node as usize].midpoint(tree.positions()[parent as usize])
-            })
-            .collect();
-        ends = curve_order(&middles).into_iter().map(|number| ends[number as usize]).collect();
-        let mut slots = vec![NONE; nodes.len()];
-        for (slot, &node) in ends.iter().enumerate() {
-            slots[(node - nodes.start) as usize] = slot as u32;
-        }
-        let boxes = PackedBoxes::new(ends.len(), |slot| box_of(tree, ends[slot]));
-        Self { nodes, ends, slots, boxes }
-    }
-
-    fn slot(&self, node: u32) -> Option<usize> {
-        let slot = self.slots[(node - self.nodes.start) as usize];
-        (slot != NONE).then_some(slot as usize)
-    }
-}
-
-fn box_of(tree: &VesselTree, node: u32) -> (Vec3, Vec3) {
-    box_around(tree, node).expect("roots have no slot")
-}
 
 /// An index over the segments of one tree.
 ///
@@ -65,13 +27,22 @@ fn box_of(tree: &VesselTree, node: u32) -> (Vec3, Vec3) {
 /// [`MAX_FLARE`](crate::synthesis::instances::MAX_FLARE)). Boxes are those of the last [`extend`](Self::extend) or
 /// refit; questions that take the tree measure it as it is.
 ///
-/// Memory: 36 bytes a segment, counted by [`bytes`](Self::bytes).
+/// Memory: 44 bytes a segment, twice that while it is merged, counted by [`bytes`](Self::bytes).
 #[derive(Clone, Debug, Default)]
 pub struct SegmentIndex {
     runs: Vec<Run>,
+    /// That all runs are sorted along.
+    curve: Curve,
 }
 
 impl SegmentIndex {
+    /// Most nodes that are sorted anew in one call, beside the new ones: some 2 ms.
+    const AT_ONCE: usize = 8192;
+    /// Steps of a merge for each new node. More than two, so that merges end before as many nodes wait for the next.
+    const PACE: usize = 4;
+    /// New nodes that a call counts at least.
+    const LEAST_SHARE: usize = 256;
+
     /// Indexes all segments of a tree.
     pub fn new(tree: &VesselTree) -> Self {
         let mut index = Self::default();
@@ -91,27 +62,63 @@ impl SegmentIndex {
 
     /// Bytes on the heap.
     pub fn bytes(&self) -> usize {
-        let run = |run: &Run| size_of::<Run>() + 4 * (run.ends.capacity() + run.slots.capacity()) + run.boxes.bytes();
-        self.runs.iter().map(run).sum()
+        self.runs.iter().map(Run::bytes).sum()
     }
 
     /// Indexes the nodes that were appended to the tree since the last call.
     ///
-    /// Takes time in proportion to the new nodes, times the logarithm of all, on average over many calls; a single call
-    /// may sort the whole tree anew. A tree with fewer nodes than are indexed is taken for another one, and indexed from
-    /// the beginning.
+    /// Every call takes time in proportion to the new nodes, times the logarithm of all; one without new nodes goes on
+    /// with what earlier ones have left, for a fraction of a millisecond. A tree with fewer nodes than are indexed is
+    /// taken for another one, and indexed from the beginning.
     pub fn extend(&mut self, tree: &VesselTree) {
         if tree.len() < self.len() {
             self.runs.clear();
         }
-        let (mut start, end) = (self.len() as u32, tree.len() as u32);
-        if start == end {
-            return;
+        let end = tree.len() as u32;
+        let new = end as usize - self.len();
+        if new > 0 {
+            self.append(tree, end);
         }
-        while let Some(run) = self.runs.pop_if(|run| run.nodes.len() < 2 * (end - start) as usize) {
-            start = run.nodes.start;
+        self.merge(Self::PACE * new.max(Self::LEAST_SHARE));
+    }
+
+    /// Makes a run of the new nodes, with those before that are quickly sorted anew.
+    fn append(&mut self, tree: &VesselTree, end: u32) {
+        let mut start = self.len() as u32;
+        let is_short = |run: &Run, start: u32| {
+            run.nodes.len() < 2 * (end - start) as usize && (end - run.nodes.start) as usize <= Self::AT_ONCE
+        };
+        while let Some(last) = self.runs.pop_if(|run| is_short(run, start)) {
+            start = last.nodes.start;
+            // A merge with what has gone.
+            if let Some(run) = self.runs.last_mut() {
+                run.merge = None;
+            }
         }
-        self.runs.push(Run::new(tree, start..end));
+        if start == 0 {
+            self.curve = curve_through(tree, 0..end);
+        }
+        self.runs.push(Run::new(tree, start..end, &self.curve));
+    }
+
+    /// Begins merges where they are due, and goes on with each for some steps.
+    fn merge(&mut self, steps: usize) {
+        for at in (1..self.runs.len()).rev() {
+            let is_taken = self.runs.get(at.wrapping_sub(2)).is_some_and(|before| before.merge.is_some());
+            let (before, after) = self.runs.split_at_mut(at);
+            let (run, next) = (&mut before[at - 1], &after[0]);
+            let is_free = !is_taken && run.merge.is_none() && next.merge.is_none();
+            if is_free && run.nodes.len() < 2 * next.nodes.len() {
+                run.begin_merge(next);
+            }
+        }
+        for at in (1..self.runs.len()).rev() {
+            let Some(mut merge) = self.runs[at - 1].merge.take() else { continue };
+            match merge.advance([&self.runs[at - 1], &self.runs[at]], steps) {
+                Some(run) => _ = self.runs.splice(at - 1..=at, [run]),
+                None => self.runs[at - 1].merge = Some(merge),
+            }
+        }
     }
 
     /// Measures the boxes of all indexed segments anew, after nodes moved or radii changed.
@@ -122,6 +129,9 @@ impl SegmentIndex {
     /// # Panics
     /// When the tree has fewer nodes than are indexed.
     pub fn refit(&mut self, tree: &VesselTree) {
+        while self.runs.iter().any(|run| run.merge.is_some()) {
+            self.merge(usize::MAX);
+        }
         for Run { ends, boxes, .. } in &mut self.runs {
             boxes.refit(|slot| box_of(tree, ends[slot]));
         }
@@ -136,10 +146,14 @@ impl SegmentIndex {
     /// When the tree has fewer nodes than are indexed.
     pub fn refit_nodes(&mut self, tree: &VesselTree, nodes: impl IntoIterator<Item = NodeId>) {
         for NodeId(node) in nodes {
-            let run = self.runs.partition_point(|run| run.nodes.end <= node);
-            let Some(run) = self.runs.get_mut(run) else { continue };
-            if let Some(slot) = run.slot(node) {
-                run.boxes.set(slot, box_of(tree, node));
+            let at = self.runs.partition_point(|run| run.nodes.end <= node);
+            let Some(run) = self.runs.get_mut(at) else { continue };
+            run.refit_node(tree, node);
+            // It may have been taken into a merge, with the next run or with the one before.
+            for pair in [Some(at), at.checked_sub(1)].into_iter().flatten() {
+                if let Some(merge) = &mut self.runs[pair].merge {
+                    merge.refit_node(tree, node);
+                }
             }
         }
     }
@@ -153,6 +167,20 @@ impl SegmentIndex {
             for run in &self.runs {
                 run.boxes.walk(|pack| pack.overlaps((min, max)), |slot| visit(NodeId(run.ends[slot])));
             }
+        }
+    }
+
+    /// Visits the end node of every segment whose box may have a point in common with a region, and perhaps others.
+    ///
+    /// In no particular order, but always in the same.
+    pub fn candidates_in(&self, region: &Region, mut visit: impl FnMut(NodeId)) {
+        let Some(slabs) = region.slabs() else { return self.candidates(region.min(), region.max(), visit) };
+        for run in &self.runs {
+            let meets = |pack: &Pack| match pack.overlaps(region.corners()) {
+                0 => 0,
+                overlaps => overlaps & pack.enters(slabs),
+            };
+            run.boxes.walk(meets, |slot| visit(NodeId(run.ends[slot])));
         }
     }
 
@@ -246,5 +274,113 @@ impl Found {
             self.least = distance;
             self.place = Some(Place::new(NodeId(node), along as f32));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesis::{
+        rng::{Stream, VesselRng},
+        tree::NO_PARENT,
+    };
+    use rand::RngExt;
+
+    fn any_point(rng: &mut VesselRng) -> Vec3 {
+        Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
+    }
+
+    /// Segments anywhere, in the order of their nodes, and roots among them.
+    fn scattered(nodes: usize, rng: &mut VesselRng) -> (Vec<Vec3>, Vec<u32>) {
+        let (mut positions, mut parents) = (Vec::new(), Vec::new());
+        for node in 0..nodes as u32 {
+            let is_root = node % 2 == 0;
+            let near = if is_root { any_point(rng) } else { positions[node as usize - 1] };
+            positions.push(near + 0.01 * any_point(rng));
+            parents.push(if is_root { NO_PARENT } else { node - 1 });
+        }
+        (positions, parents)
+    }
+
+    fn found(index: &SegmentIndex, min: Vec3, max: Vec3) -> Vec<NodeId> {
+        let mut found = Vec::new();
+        index.candidates(min, max, |node| found.push(node));
+        found.sort_unstable();
+        found
+    }
+
+    /// Runs are few, lie end to end, and are each in one merge at most.
+    fn check_runs(index: &SegmentIndex, what: &str) {
+        let most = 2 * index.len().max(2).ilog2() as usize;
+        assert!(index.runs.len() <= most, "{what}: {} runs of {} nodes", index.runs.len(), index.len());
+        for pair in index.runs.windows(2) {
+            assert_eq!(pair[0].nodes.end, pair[1].nodes.start, "{what}");
+            assert!(pair[0].merge.is_none() || pair[1].merge.is_none(), "{what}");
+        }
+        assert!(index.runs.last().is_none_or(|run| run.merge.is_none()), "{what}");
+    }
+
+    #[test]
+    fn merges_in_steps_change_no_answer() {
+        let mut rng = Stream::Statistics.rng(3);
+        let nodes = 60_000;
+        let (mut positions, parents) = scattered(nodes, &mut rng);
+        let mut index = SegmentIndex::default();
+        let (mut len, mut merging, mut call) = (0, 0, 0);
+        while len < nodes {
+            let before = len;
+            len = (len + rng.random_range(0..600)).min(nodes);
+            call += 1;
+            // Some of the nodes that were there move, with their segments and children.
+            let moved: Vec<usize> = (0..20.min(before)).map(|_| rng.random_range(0..before)).collect();
+            for &node in &moved {
+                positions[node] += 0.1 * any_point(&mut rng);
+            }
+            let tree = VesselTree::from_arrays(positions[..len].to_vec(), parents[..len].to_vec(), vec![1e-4; len])
+                .expect("a tree");
+            let touched = moved.iter().flat_map(|&node| [node, node + 1]).map(|node| NodeId(node as u32));
+            index.refit_nodes(&tree, touched);
+            index.extend(&tree);
+            if call % 97 == 0 {
+                index.refit(&tree);
+            }
+            check_runs(&index, &format!("call {call}"));
+            merging += usize::from(index.runs.iter().any(|run| run.merge.is_some()));
+            if call % 10 == 0 || len == nodes {
+                let anew = SegmentIndex::new(&tree);
+                for _ in 0..20 {
+                    let (center, half) = (any_point(&mut rng), 0.1 * any_point(&mut rng).abs());
+                    let [fast, slow] = [&index, &anew].map(|index| found(index, center - half, center + half));
+                    assert_eq!(fast, slow, "call {call}");
+                }
+            }
+        }
+        assert!(merging > 50, "{merging} calls left a merge");
+    }
+
+    #[test]
+    fn runs_stay_few_and_steps_in_proportion() {
+        let mut rng = Stream::Statistics.rng(4);
+        let nodes = 400_000;
+        let (positions, parents) = scattered(nodes, &mut rng);
+        let mut index = SegmentIndex::default();
+        let mut tree = VesselTree::from_arrays(positions, parents, vec![1e-4; nodes]).expect("a tree");
+        let mut len = 0;
+        while len < nodes {
+            let before = len;
+            len = (len + [700, 3_000, 40, 12_000][rng.random_range(0..4)]).min(nodes);
+            index.append(&tree, len as u32);
+            index.merge(SegmentIndex::PACE * (len - before).max(SegmentIndex::LEAST_SHARE));
+            check_runs(&index, &format!("{len} nodes"));
+        }
+        // What is left over ends without growth.
+        for _ in 0..nodes / SegmentIndex::LEAST_SHARE {
+            index.extend(&tree);
+        }
+        assert!(index.runs.iter().all(|run| run.merge.is_none()));
+        assert!(index.runs.windows(2).all(|pair| pair[0].nodes.len() >= 2 * pair[1].nodes.len()));
+        tree = VesselTree::from_arrays(vec![Vec3::ZERO, Vec3::X], vec![NO_PARENT, 0], vec![1e-4; 2]).expect("a tree");
+        index.extend(&tree);
+        assert_eq!((index.len(), found(&index, Vec3::ZERO, Vec3::X)), (2, vec![NodeId(1)]));
     }
 }

@@ -6,7 +6,7 @@
 
 use super::crossing::segment;
 use super::injury::{Gap, Injury, Tip};
-use super::{EndId, Wounds};
+use super::{EndId, Region, Wounds};
 use crate::synthesis::haemodynamics::{Interruption, Outlet};
 use crate::synthesis::instances::{SegmentColors, SegmentInstance, segment_instance};
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
@@ -138,7 +138,7 @@ impl Wounds {
     pub fn nearest_place(
         &self,
         tree: &VesselTree,
-        mut candidates: impl FnMut(Vec3, Vec3, &mut dyn FnMut(NodeId)),
+        mut candidates: impl FnMut(&Region, &mut dyn FnMut(NodeId)),
         point: Vec3,
         reach: f32,
     ) -> Option<(Place, f32)> {
@@ -146,7 +146,7 @@ impl Wounds {
         if !(point.is_finite() && reach >= 0.0 && reach.is_finite()) {
             return None;
         }
-        candidates(point - reach, point + reach, &mut |node| {
+        candidates(&Region::between(point - reach, point + reach), &mut |node| {
             let Some([parent, end]) = segment(tree, node) else { return };
             let radius = tree.radii()[node.index()];
             let mut try_piece = |[from, to]: [f32; 2]| {

@@ -3,10 +3,9 @@
 use super::blade::Shape;
 use super::crossing::{Severed, segment, severed, within};
 use super::injury::{ClosureKind, End, Injury, Removal};
-use super::{Blade, BladeError, ClampId, EndId, Retraction, SeveredEnd, WoundError, WoundReport};
+use super::{Blade, BladeError, ClampId, EndId, Region, Retraction, SeveredEnd, WoundError, WoundReport};
 use crate::synthesis::haemodynamics::EndSide;
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
-use bevy_math::Vec3;
 use std::{collections::BTreeMap, ops::Range};
 
 /// All that was done to one tree.
@@ -14,8 +13,8 @@ use std::{collections::BTreeMap, ops::Range};
 /// The tree itself stays as it is: it may grow and move beneath, and every place keeps its share of its segment. All
 /// calls take the tree that the wounds belong to; after another one took its place, [`clear`](Self::clear).
 ///
-/// `candidates(min, max, visit)` is the index over the tree's segments: it calls `visit` with at least those that meet a
-/// box.
+/// `candidates(region, visit)` is the index over the tree's segments: it calls `visit` with at least those that meet a
+/// region, as [`SegmentIndex::candidates_in`](super::SegmentIndex::candidates_in) does.
 #[derive(Clone, Debug, Default)]
 pub struct Wounds {
     retraction: Retraction,
@@ -94,7 +93,7 @@ impl Wounds {
         &mut self,
         blade: &Blade,
         tree: &VesselTree,
-        candidates: impl FnMut(Vec3, Vec3, &mut dyn FnMut(NodeId)),
+        candidates: impl FnMut(&Region, &mut dyn FnMut(NodeId)),
     ) -> WoundReport {
         let mut hits = std::mem::take(&mut self.hits);
         severed(blade, tree, candidates, &mut hits);
@@ -163,14 +162,14 @@ impl Wounds {
         volume: &Blade,
         max_calibre: f32,
         tree: &VesselTree,
-        mut candidates: impl FnMut(Vec3, Vec3, &mut dyn FnMut(NodeId)),
+        mut candidates: impl FnMut(&Region, &mut dyn FnMut(NodeId)),
     ) -> Result<WoundReport, WoundError> {
         let Shape::Volume(inside) = &volume.shape else { return Err(BladeError::NotAVolume.into()) };
         if !(max_calibre > 0.0) {
             return Err(WoundError::Calibre { calibre: max_calibre });
         }
         let mut nodes = Vec::new();
-        volume.parts(|[min, max], _| candidates(min, max, &mut |node| nodes.push(node.0)));
+        volume.parts(|region, _| candidates(region, &mut |node| nodes.push(node.0)));
         nodes.sort_unstable();
         nodes.dedup();
         let action = self.begin();

@@ -1,0 +1,131 @@
+//! An organ's vertices as nodes follow them: each with the normal there, measured anew for every pose.
+//!
+//! In: a [`TriangleMesh`], then positions of its vertices. Out: a [`Vertex`] for each. Normals are the mean over the
+//! triangles around a position, weighted by area, as in [`TriangleMesh::vertex_normals`]; here in f32 and gathered
+//! vertex by vertex, so that threads share the work and nothing depends on their number.
+
+use super::map_all;
+use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
+use bevy_math::{Vec3, Vec3A};
+
+/// A vertex of a deformed organ. Position and normal lie side by side: a node asks for both, anywhere in the mesh.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Vertex {
+    pub position: Vec3A,
+    /// Unit length, or zero where the triangles around have no area or cancel out.
+    pub normal: Vec3A,
+}
+
+/// What it takes to measure vertices, with room for what is measured on the way.
+#[derive(Clone, Debug)]
+pub(super) struct Vertices {
+    triangles: Vec<[u32; 3]>,
+    welding: Welding,
+    /// Of each welded vertex, where its triangles begin and end in `around`.
+    ranges: Vec<[u32; 2]>,
+    /// The triangles around each welded vertex.
+    around: Vec<u32>,
+    /// Twice the area of each triangle, along its normal, in units that depend on the pose.
+    areas: Vec<Vec3A>,
+    /// Of each welded vertex.
+    normals: Vec<Vec3A>,
+}
+
+impl Vertices {
+    pub fn new(mesh: &TriangleMesh) -> Self {
+        let welding = mesh.weld();
+        let triangles = mesh.triangles().to_vec();
+        let mut ranges = vec![[0; 2]; welding.count()];
+        for &corner in triangles.as_flattened() {
+            ranges[welding.vertex(corner)][1] += 1;
+        }
+        let mut end = 0;
+        for range in &mut ranges {
+            let count = range[1];
+            *range = [end; 2];
+            end += count;
+        }
+        let mut around = vec![0; 3 * triangles.len()];
+        for (triangle, corners) in (0..).zip(&triangles) {
+            for &corner in corners {
+                let [_, end] = &mut ranges[welding.vertex(corner)];
+                around[*end as usize] = triangle;
+                *end += 1;
+            }
+        }
+        let areas = vec![Vec3A::ZERO; triangles.len()];
+        let normals = vec![Vec3A::ZERO; welding.count()];
+        Self { triangles, welding, ranges, around, areas, normals }
+    }
+
+    /// Measures all vertices at finite positions, of which there are as many as the mesh has. Returns the power of two
+    /// that brings their coordinates near 1.
+    pub fn measure(&mut self, positions: &[Vec3], vertices: &mut Vec<Vertex>) -> f32 {
+        // Products stay within f32 at any size of the organ.
+        let scale = scale_to_one(positions);
+        let area = |_, corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|corner| Vec3A::from(positions[corner as usize]) * scale);
+            (b - a).cross(c - a)
+        };
+        map_all(&self.triangles, &mut self.areas, area);
+        let (around, areas) = (&self.around, &self.areas);
+        let normal = |_, &[from, to]: &[u32; 2]| {
+            let areas = around[from as usize..to as usize].iter().map(|&triangle| areas[triangle as usize]);
+            // In f64, where no square of an area vanishes.
+            Vec3A::from(unit(areas.sum::<Vec3A>().as_dvec3()))
+        };
+        map_all(&self.ranges, &mut self.normals, normal);
+        let (welding, normals) = (&self.welding, &self.normals);
+        vertices.resize(positions.len(), Vertex::default());
+        map_all(positions, vertices, |vertex, &position| Vertex {
+            position: position.into(),
+            normal: normals[welding.vertex(vertex as u32)],
+        });
+        scale
+    }
+}
+
+/// A power of two by which the largest coordinate comes to between 1 and 4.
+fn scale_to_one(positions: &[Vec3]) -> f32 {
+    const EXPONENT: u32 = f32::INFINITY.to_bits();
+    let largest = positions.iter().fold(Vec3::ZERO, |largest, position| largest.max(position.abs())).max_element();
+    // The exponent with its sign turned, kept from becoming that of 0 or of infinity.
+    let inverse = (2 * 1.0f32.to_bits()).saturating_sub(largest.to_bits() & EXPONENT);
+    f32::from_bits(inverse.clamp(f32::MIN_POSITIVE.to_bits(), f32::MAX.to_bits() & EXPONENT))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_math::Quat;
+
+    /// A fan around a tip, every triangle with corners of its own.
+    fn fan(size: f32) -> TriangleMesh {
+        let rim = |k: u8| Quat::from_rotation_z(f32::from(k)) * Vec3::new(1.0, 0.0, -0.5);
+        let positions: Vec<Vec3> = (0..6).flat_map(|k| [Vec3::ZERO, rim(k), rim(k + 1)]).map(|p| p * size).collect();
+        let triangles = (0..6).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        TriangleMesh::new(positions, triangles, None).expect("a mesh")
+    }
+
+    #[test]
+    fn normals_are_those_of_the_mesh_at_any_size() {
+        for size in [1.0e-9, 1.0e-3, 1.0, 7.0e8] {
+            let mesh = fan(size);
+            let mut vertices = Vec::new();
+            Vertices::new(&mesh).measure(mesh.positions(), &mut vertices);
+            for (vertex, expected) in vertices.iter().zip(mesh.vertex_normals()) {
+                assert!((Vec3::from(vertex.normal) - expected).length() < 1.0e-6, "size {size}: {}", vertex.normal);
+            }
+        }
+    }
+
+    #[test]
+    fn any_finite_coordinate_is_brought_near_one() {
+        for largest in [0.0, f32::from_bits(1), f32::MIN_POSITIVE, 0.7, 1.0, 3.9, 1.0e9, f32::MAX] {
+            let scale = scale_to_one(&[Vec3::new(0.0, -largest, 0.5 * largest)]);
+            assert!(scale.is_normal() && scale.to_bits().trailing_zeros() >= 23, "{largest}: {scale}");
+            let scaled = largest * scale;
+            assert!(scaled < 4.0 && (largest < f32::MIN_POSITIVE || scaled >= 0.5), "{largest}: {scaled}");
+        }
+    }
+}
