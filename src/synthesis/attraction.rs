@@ -4,10 +4,11 @@
 //! keeps that node between steps and is told of what happens to it, so that a step costs as much as happens in it, however
 //! many drains wait:
 //!
-//! - a new node [makes itself known](Drains::announce) to the drains within reach, and may become their nearest;
+//! - a new node [makes itself known](News) to the drains within reach, and may become their nearest;
 //! - a node that closes, or hears in another way than before, [wakes](Drains::wake) the drains that wait at it;
 //! - all other drains sleep. Asked again, they would answer as they did before.
 
+use crate::synthesis::parallel;
 use crate::synthesis::point_grid::PointGrid;
 use bevy_math::{Vec3, bounding::Aabb3d};
 
@@ -75,6 +76,9 @@ pub(crate) struct Heard {
     pub distance: f32,
 }
 
+/// New nodes whose drains one thread looks for at a time.
+const NODES_PER_SHARE: usize = 256;
+
 /// Which drains hear of new nodes. Keeps its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct News {
@@ -85,15 +89,14 @@ pub(crate) struct News {
 impl News {
     /// Finds for each of some nodes, which are numbered from `first` on, the drains within `reach` to which it is news.
     pub fn spread(&mut self, drains: &Drains, first: u32, positions: &[Vec3], reach: f32) {
-        let size = 256;
-        let count = positions.len().div_ceil(size);
+        let count = positions.len().div_ceil(NODES_PER_SHARE);
         if self.shares.len() < count {
             self.shares.resize_with(count, Vec::new);
         }
         self.shares.iter_mut().for_each(Vec::clear);
-        crate::synthesis::colonization::parallel::for_each(&mut self.shares[..count], |share, heard| {
-            let start = share * size;
-            let end = positions.len().min(start + size);
+        parallel::for_each(&mut self.shares[..count], |share, heard| {
+            let start = share * NODES_PER_SHARE;
+            let end = positions.len().min(start + NODES_PER_SHARE);
             for (node, &position) in (first + start as u32..).zip(&positions[start..end]) {
                 drains.grid.for_each_within(position, reach, |drain, distance| {
                     let known = &drains.hearing[drain as usize];
@@ -139,11 +142,6 @@ impl Drains {
     /// Follows lengths that have changed: finer cells for shorter ones.
     pub fn resize_cells(&mut self, cell: f32) {
         self.grid.resize_cells(cell);
-    }
-
-    /// Side of the index's cells.
-    pub fn cell(&self) -> f32 {
-        self.grid.cell()
     }
 
     /// Number of living drains.

@@ -50,7 +50,6 @@
 //! ```
 
 mod alias;
-mod spatial_order;
 mod attraction;
 pub mod binding;
 pub mod colonization;
@@ -62,10 +61,12 @@ pub mod mesh;
 pub mod murray;
 pub mod organ;
 mod packed_boxes;
+mod parallel;
 pub mod point_grid;
 pub mod preset;
 pub mod rng;
 pub mod roots;
+mod spatial_order;
 pub mod tissue;
 pub mod tree;
 pub mod units;

@@ -26,6 +26,8 @@ const NONE: u32 = u32::MAX;
 /// The brick without points, which stands in the table where there is no other, and the block without points, which ends
 /// every chain. With them a question needs not ask whether there is something to look at.
 const EMPTY: u32 = 0;
+/// Fewest points whose order in memory matters: less lie in the processor's cache however they are ordered.
+const WORTH_ORDERING: usize = 20_000;
 /// Questions that are asked at once.
 const BATCH: usize = 32;
 
@@ -55,7 +57,9 @@ pub struct PointGrid {
     free: u32,
     /// Points by id; [`REMOVED`] for those that are not there.
     points: Vec<Vec3>,
-    laid: usize,
+    /// Number of ids when the points were last put in order.
+    ordered: usize,
+    order: SpatialOrder,
 }
 
 /// 4×4×4 cells: which of them hold points, and the first block of each of these.
@@ -120,7 +124,7 @@ impl PointGrid {
     /// Removes all points and lays the grid anew, keeping its memory.
     pub fn reset(&mut self, bounds: &Aabb3d, cell: f32) {
         self.points.clear();
-        self.laid = 0;
+        self.ordered = 0;
         self.lay(bounds.min, bounds.max, cell);
     }
 
@@ -129,19 +133,21 @@ impl PointGrid {
     pub fn resize_cells(&mut self, cell: f32) {
         let max = self.origin + self.cells.as_vec3a() * self.cell;
         self.lay(self.origin, max, cell);
-        let mut order = SpatialOrder::default();
+        let mut order = std::mem::take(&mut self.order);
         order.sort(&Aabb3d { min: self.origin, max }, &self.points);
         for &id in order.indices() {
             if !self.points[id as usize].is_nan() {
                 self.link(id);
             }
         }
-        self.laid = self.points.len();
+        self.order = order;
+        self.ordered = self.points.len();
     }
 
-    /// Whether most points came since the grid was laid.
-    pub fn is_untidy(&self) -> bool {
-        self.points.len() > 20_000 && self.points.len() > self.laid * 3 / 2
+    /// Whether so many points have come since the last [`resize_cells`](Self::resize_cells) that it pays to lay the grid anew
+    /// with cells of the same size, for the sake of the order in memory alone.
+    pub fn is_scattered(&self) -> bool {
+        self.points.len() > WORTH_ORDERING && self.points.len() > self.ordered + self.ordered / 2
     }
 
     fn lay(&mut self, min: Vec3A, max: Vec3A, cell: f32) {
@@ -542,6 +548,7 @@ mod tests {
         for seed in 0..6 {
             let (mut grid, twin) = grid(seed, seed % 2 == 0);
             let mut rng = Stream::Roots.rng(seed);
+            let mut marked = 0;
             for cell in [0.07, 0.021, 0.4] {
                 grid.resize_cells(cell);
                 for _ in 0..200 {
@@ -550,6 +557,10 @@ mod tests {
                     let expected = brute_nearest(&twin, center, radius, 1);
                     assert_eq!(grid.nearest_within(center, radius, |_| true), expected);
                     assert_eq!(grid.any_within(center, radius), expected.is_some());
+                    let mut marks = [false, true];
+                    grid.mark_beside(&[center, center], radius, &mut marks);
+                    assert!(marks[1] && (!marks[0] || expected.is_some()));
+                    marked += u32::from(marks[0]);
                     let odd = brute_nearest(&twin, center, radius, 3);
                     assert_eq!(grid.nearest_within(center, radius, |id| id % 3 == 0), odd);
                     let mut count = 0;
@@ -558,6 +569,7 @@ mod tests {
                     assert_eq!(count, all);
                 }
             }
+            assert!(marked > 20, "only {marked} were found in their own cells");
         }
     }
 

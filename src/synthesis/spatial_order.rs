@@ -8,7 +8,7 @@ const POINTS_PER_CELL: f32 = 8.0;
 const MOST_CELLS: f32 = 1024.0;
 
 /// Sorts points into the cells of a box, row by row. Keeps its buffers.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct SpatialOrder {
     cells: Vec<u32>,
     ends: Vec<u32>,
@@ -50,5 +50,40 @@ impl SpatialOrder {
     /// Indices of the points last sorted, in their order in space.
     pub fn indices(&self) -> &[u32] {
         &self.indices
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesis::rng::Stream;
+    use rand::RngExt;
+
+    #[test]
+    fn every_point_comes_once_and_neighbours_come_together() {
+        let bounds = Aabb3d::new(Vec3::splat(0.5), Vec3::splat(0.5));
+        let mut rng = Stream::Statistics.rng(2);
+        let mut point = || Vec3::from_array(std::array::from_fn(|_| rng.random_range(-0.1..1.1)));
+        let points: Vec<Vec3> = (0..5000).map(|_| point()).collect();
+        let mut order = SpatialOrder::default();
+        order.sort(&bounds, &points[..100]);
+        order.sort(&bounds, &points);
+        let mut indices = order.indices().to_vec();
+        let way = |indices: &[u32]| {
+            indices.windows(2).map(|pair| points[pair[0] as usize].distance(points[pair[1] as usize])).sum::<f32>()
+        };
+        let sorted = way(&indices);
+        indices.sort_unstable();
+        assert!(indices.iter().copied().eq(0..5000));
+        assert!(sorted < 0.4 * way(&indices), "{sorted} of {}", way(&indices));
+    }
+
+    #[test]
+    fn points_that_are_no_numbers_and_boxes_without_size_are_sorted_too() {
+        let mut order = SpatialOrder::default();
+        order.sort(&Aabb3d::new(Vec3::ONE, Vec3::ZERO), &[Vec3::ONE, Vec3::NAN, Vec3::INFINITY, Vec3::NEG_INFINITY]);
+        assert_eq!(order.indices().len(), 4);
+        order.sort(&Aabb3d::new(Vec3::ONE, Vec3::ZERO), &[]);
+        assert!(order.indices().is_empty());
     }
 }

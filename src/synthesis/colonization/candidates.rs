@@ -2,8 +2,8 @@
 //!
 //! Every block of every step has its own stretch of the random stream. So what is drawn does not depend on who draws it.
 
-use super::parallel;
 use super::vacancy::Vacancy;
+use crate::synthesis::parallel;
 use crate::synthesis::rng::{Stream, VesselRng};
 use crate::synthesis::spatial_order::SpatialOrder;
 use crate::synthesis::tissue::Tissue;

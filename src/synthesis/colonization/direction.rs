@@ -128,22 +128,22 @@ mod tests {
         let direction = Vec3::new(-1.0, 2.0, 0.5).normalize();
         let points: Vec<Vec3> = (-3..=3).map(|i| direction * i as f32 + Vec3::Z * 0.01 * (i % 2) as f32).collect();
         let reversed: Vec<Vec3> = points.iter().rev().map(|p| p * 1e-12).collect();
-        let line = principal_line(Vec3::ZERO, &points);
+        let line = principal_line(Vec3::ZERO, points.iter().copied());
         assert!(line.dot(direction).abs() > 0.999);
-        assert!(principal_line(Vec3::ZERO, &reversed).dot(line) > 0.999);
-        assert_eq!(principal_line(Vec3::ONE, &[Vec3::ONE; 4]), Vec3::X);
+        assert!(principal_line(Vec3::ZERO, reversed.iter().copied()).dot(line) > 0.999);
+        assert_eq!(principal_line(Vec3::ONE, [Vec3::ONE; 4].into_iter()), Vec3::X);
     }
 
     #[test]
     fn daughters_open_by_twice_the_half_angle_in_the_drains_plane() {
         let half = 37.5_f32.to_radians();
         let drains = [Vec3::new(1.0, 0.4, 0.0), Vec3::new(1.0, -0.5, 0.0), Vec3::new(0.9, 0.6, 0.0)];
-        let [a, b] = bifurcate(Vec3::ZERO, Vec3::new(0.8, 0.1, 0.3).normalize(), &drains, half);
+        let [a, b] = bifurcate(Vec3::ZERO, Vec3::new(0.8, 0.1, 0.3).normalize(), drains.into_iter(), half);
         assert!((a.angle_between(b) - 2.0 * half).abs() < 1e-4);
         assert!(a.z.abs() < 1e-5 && b.z.abs() < 1e-5);
         // Drains in a row with the node: any plane, but the angle holds.
         let row = [Vec3::X, Vec3::X * 2.0];
-        let [a, b] = bifurcate(Vec3::ZERO, Vec3::X, &row, half);
+        let [a, b] = bifurcate(Vec3::ZERO, Vec3::X, row.into_iter(), half);
         assert!((a.angle_between(b) - 2.0 * half).abs() < 1e-4 && a.is_finite());
     }
 
@@ -159,8 +159,8 @@ mod tests {
     #[test]
     fn spread_is_measured_as_asked() {
         let drains = [Vec3::new(1.0, 1.0, 0.0), Vec3::X];
-        let deviation = spread(Vec3::ZERO, Vec3::X, &drains, AngleSpread::StandardDeviation, &mut Vec::new());
-        let root = spread(Vec3::ZERO, Vec3::X, &drains, AngleSpread::RootSumOfSquares, &mut Vec::new());
+        let deviation = spread(Vec3::ZERO, Vec3::X, drains.into_iter(), AngleSpread::StandardDeviation);
+        let root = spread(Vec3::ZERO, Vec3::X, drains.into_iter(), AngleSpread::RootSumOfSquares);
         assert!((deviation.to_degrees() - 22.5).abs() < 1e-3);
         assert!((root.to_degrees() - 22.5 * 2.0_f32.sqrt()).abs() < 1e-3);
     }

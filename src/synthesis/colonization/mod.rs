@@ -13,7 +13,6 @@ mod candidates;
 mod direction;
 mod forest;
 mod lengths;
-pub(crate) mod parallel;
 mod perception;
 pub mod settings;
 mod system_growth;
@@ -24,6 +23,7 @@ mod vacancy;
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
 use crate::synthesis::haemodynamics::BedLink;
+use crate::synthesis::parallel;
 use crate::synthesis::roots::{RootError, Roots};
 use crate::synthesis::tissue::{Extent, Tissue, TissuePoint};
 use crate::synthesis::tree::{NodeId, System, VesselTree};
@@ -90,6 +90,8 @@ pub struct Growth {
     settings: ColonizationSettings,
     systems: [SystemGrowth; 2],
     step: u32,
+    /// Steps in a row, up to the last one, that brought nothing.
+    idle: u32,
     candidates: Candidates,
     vacancy: Vacancy,
     /// Drains on their way from the arteries to the veins.
@@ -118,6 +120,7 @@ impl Growth {
             settings,
             systems,
             step: 0,
+            idle: 0,
             candidates,
             vacancy: Vacancy::default(),
             handed: Vec::new(),
@@ -141,7 +144,7 @@ impl Growth {
         }
         self.settings = settings;
         self.candidates.restart(seed);
-        self.step = 0;
+        (self.step, self.idle) = (0, 0);
         self.links.clear();
         self.reset_vacancy();
         self.plant(&placed, roots);
@@ -191,6 +194,8 @@ impl Growth {
         let [arteries, veins] = &mut self.systems;
         let (born, arterial) = grow_arteries(arteries, &mut self.candidates, &mut self.vacancy, tissue, settings, step);
         let venous = grow_veins(veins, arteries.supplied(), &mut self.links, tissue, settings, step);
+        let acted = born > 0 || arterial.new_nodes > 0 || venous.new_nodes > 0;
+        self.idle = idle_after(self.idle, acted, tissue, settings, step);
         StepReport { step, sampled: settings.samples, born, systems: [arterial, venous] }
     }
 
@@ -204,27 +209,46 @@ impl Growth {
     /// Arteries never look at veins. So while the veins grow towards what the arteries supplied in one step, the arteries
     /// take the next one, on another thread if there is one.
     pub fn run(&mut self) {
-        let (first, last) = (self.step + 1, self.settings.steps);
         let (tissue, settings) = (self.tissue.as_ref(), &self.settings);
         let (candidates, vacancy) = (&mut self.candidates, &mut self.vacancy);
         let ([arteries, veins], handed, links) = (&mut self.systems, &mut self.handed, &mut self.links);
+        let (step, idle) = (&mut self.step, &mut self.idle);
         parallel::with_company(|| {
-            for step in first..=last.saturating_add(1) {
-                parallel::join(
-                    || step <= last && grow_arteries(arteries, candidates, vacancy, tissue, settings, step).0 > 0,
-                    || step > first && grow_veins(veins, handed, links, tissue, settings, step - 1).new_nodes > 0,
-                );
+            // The step that the veins have not taken yet, and whether the arteries did something in it.
+            let (mut waiting, mut acted) = (None, true);
+            let mut grow_veins = |handed: &[Supplied], waiting: Option<u32>| {
+                waiting.is_some_and(|step| grow_veins(veins, handed, links, tissue, settings, step).new_nodes > 0)
+            };
+            while !is_over(*step, *idle, settings) {
+                if !acted {
+                    // It depends on the veins whether there is a next step.
+                    let grown = grow_veins(handed, waiting.take());
+                    *idle = idle_after(*idle, grown, tissue, settings, *step);
+                    acted = true;
+                    continue;
+                }
+                let next = *step + 1;
+                let grow = || grow_arteries(arteries, candidates, vacancy, tissue, settings, next);
+                let ((born, report), _) = parallel::join(grow, || grow_veins(handed, waiting));
+                acted = born > 0 || report.new_nodes > 0;
+                if acted {
+                    *idle = 0;
+                }
                 handed.clear();
                 handed.extend_from_slice(arteries.supplied());
+                (*step, waiting) = (next, Some(next));
+            }
+            let grown = grow_veins(handed, waiting);
+            if !acted {
+                *idle = idle_after(*idle, grown, tissue, settings, *step);
             }
         });
-        self.step = last;
         self.settle();
     }
 
-    /// Whether all steps have been taken.
+    /// Whether all steps have been taken, or [`idle_steps`](ColonizationSettings::idle_steps) that brought nothing.
     pub fn is_finished(&self) -> bool {
-        self.step >= self.settings.steps
+        is_over(self.step, self.idle, &self.settings)
     }
 
     /// Number of steps taken.
@@ -310,6 +334,17 @@ impl Growth {
     }
 }
 
+fn is_over(step: u32, idle: u32, settings: &ColonizationSettings) -> bool {
+    step >= settings.steps || (settings.idle_steps > 0 && idle >= settings.idle_steps)
+}
+
+/// Number of steps in a row that brought nothing, given the one before a step and whether the step brought something. Steps
+/// do not count as long as tissue that grows or changes may need more vessels.
+fn idle_after(idle: u32, acted: bool, tissue: &dyn Tissue, settings: &ColonizationSettings, step: u32) -> u32 {
+    let settled = System::ALL.iter().all(|&system| settings.system(system).tissue_growth.is_over(step));
+    if acted || !settled || tissue.stage(step).is_some() { 0 } else { idle + 1 }
+}
+
 /// Draws candidates, lets those in unsupplied tissue become drains, and grows the arteries towards them. The number of
 /// drains born comes back.
 fn grow_arteries(
@@ -325,7 +360,9 @@ fn grow_arteries(
     if tissue.stage(1).is_none() {
         vacancy.prepare(tissue, arteries.length_scale(), arteries.forest.tree.positions(), arteries.drains.living());
     }
-    candidates.draw(ground.tissue, vacancy, step, settings.samples, |candidates, refused| arteries.refuse(candidates, refused));
+    candidates.draw(ground.tissue, vacancy, step, settings.samples, |candidates, refused| {
+        arteries.refuse(candidates, refused)
+    });
     let mut born = 0;
     for candidate in candidates.iter() {
         if let Some(drain) = arteries.offer_drain(candidate) {

@@ -3,6 +3,7 @@
 use super::forest::Forest;
 use super::lengths::Lengths;
 use crate::synthesis::attraction::{Drains, Found, ON_THE_NODE, cos_at};
+use crate::synthesis::parallel;
 use bevy_math::{Vec3, ops};
 
 /// A drain that acts on a node.
@@ -66,7 +67,7 @@ impl Search {
         self.asking.extend(drains.awake().iter().filter(|&&drain| drains.is_searching(drain)));
         let shared = &*drains;
         let find = |&drain: &u32| nearest_open(forest, lengths, shared.position(drain));
-        super::parallel::map_into(&self.asking, &mut self.found, Found::default(), find);
+        parallel::map_into(&self.asking, &mut self.found, Found::default(), find);
         for (&drain, &found) in self.asking.iter().zip(&self.found) {
             drains.settle(drain, found);
         }

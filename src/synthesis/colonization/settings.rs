@@ -198,6 +198,12 @@ pub struct ColonizationSettings {
     ///
     /// More samples fill the tissue faster. Default: [`Self::DEFAULT_SAMPLES`].
     pub samples: u32,
+    /// Growth ends before its last step when so many steps in a row, after the tissue has ceased to grow, brought neither a
+    /// drain nor a segment: the tissue is full, or what is left of it is out of reach. A tissue that changes in stages is
+    /// grown to the last step all the same.
+    ///
+    /// 0 turns this off. Default: [`Self::DEFAULT_IDLE_STEPS`].
+    pub idle_steps: u32,
     /// Settings of the arteries.
     pub arterial: SystemSettings,
     /// Settings of the veins.
@@ -219,6 +225,8 @@ impl ColonizationSettings {
     pub const DEFAULT_STEPS: u32 = 100;
     /// Samples a step of the paper's examples.
     pub const DEFAULT_SAMPLES: u32 = 1000;
+    /// With the default samples 20,000 of them have then been refused in a row.
+    pub const DEFAULT_IDLE_STEPS: u32 = 20;
     /// Most samples a step; more than this is surely a slip.
     pub const MAX_SAMPLES: u32 = 100_000_000;
 
@@ -271,6 +279,7 @@ impl Default for ColonizationSettings {
         Self {
             steps: Self::DEFAULT_STEPS,
             samples: Self::DEFAULT_SAMPLES,
+            idle_steps: Self::DEFAULT_IDLE_STEPS,
             arterial,
             venous,
             confine: true,

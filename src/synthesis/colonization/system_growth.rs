@@ -4,11 +4,12 @@ use super::SystemReport;
 use super::direction::{Decision, decide};
 use super::forest::Forest;
 use super::lengths::Lengths;
-use super::parallel;
 use super::perception::{self, Pull, Search};
 use super::settings::SystemSettings;
 use crate::synthesis::attraction::{Drains, News};
 use crate::synthesis::haemodynamics::BedLink;
+use crate::synthesis::parallel;
+use crate::synthesis::point_grid::PointGrid;
 use crate::synthesis::tissue::{Tissue, TissuePoint};
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d};
@@ -182,14 +183,7 @@ impl SystemGrowth {
         self.forest.set_tip_radius(self.lengths.terminal_radius);
         perception::associate(&self.forest, &self.lengths, &mut self.drains, &mut self.search, &mut self.pulls);
         self.decide(ground);
-        let mut growing = std::mem::take(&mut self.growing);
-        for node in &growing {
-            for &tip in &node.tips[..node.count] {
-                self.extend(node.node, tip, step);
-            }
-        }
-        growing.clear();
-        self.growing = growing;
+        self.extend(step);
         self.spread_news(first_new);
         self.kill();
         SystemReport {
@@ -215,19 +209,26 @@ impl SystemGrowth {
             let place = |direction: Vec3| ground.place(position + direction * lengths.step);
             let drains = pulls.iter().map(|pull| drains.position(pull.drain));
             match decide(forest, lengths, node, drains) {
-                Decision::Extend(direction) => Growing { node, count: 1, tips: [place(direction), TissuePoint::default()] },
+                Decision::Extend(direction) => {
+                    Growing { node, count: 1, tips: [place(direction), TissuePoint::default()] }
+                }
                 Decision::Bifurcate(directions) => Growing { node, count: 2, tips: directions.map(place) },
                 Decision::Rest => Growing { node, ..Growing::default() },
             }
         });
     }
 
-    /// Adds a segment to a node, unless its end would lie on another node or nowhere.
-    fn extend(&mut self, node: u32, at: TissuePoint, step: u32) {
-        let free = at.position.is_finite()
-            && !self.forest.index().any_within(at.position, LEAST_SEPARATION * self.lengths.step);
-        if free {
-            self.forest.add_tip(node, at, step);
+    /// Adds the segments that were decided on, but those that would end on another node or nowhere.
+    fn extend(&mut self, step: u32) {
+        let Self { forest, lengths, growing, .. } = self;
+        for growing in growing {
+            for &tip in &growing.tips[..growing.count] {
+                let free = tip.position.is_finite()
+                    && !forest.index().any_within(tip.position, LEAST_SEPARATION * lengths.step);
+                if free {
+                    forest.add_tip(growing.node, tip, step);
+                }
+            }
         }
     }
 
@@ -269,10 +270,10 @@ impl SystemGrowth {
         if self.lengths.reach() > before {
             self.drains.wake_all();
         }
-        if !FITTING_CELLS.contains(&(self.lengths.node_cell() / self.forest.index().cell())) || self.forest.index().is_untidy() {
+        if needs_laying(self.forest.index(), self.lengths.node_cell()) {
             self.forest.resize_cells(self.lengths.node_cell());
         }
-        if !FITTING_CELLS.contains(&(self.lengths.drain_cell() / self.drains.cell())) || self.drains.index().is_untidy() {
+        if needs_laying(self.drains.index(), self.lengths.drain_cell()) {
             self.drains.resize_cells(self.lengths.drain_cell());
         }
     }
@@ -281,6 +282,11 @@ impl SystemGrowth {
     pub fn length_scale(&self) -> f32 {
         self.size.recip()
     }
+}
+
+/// Whether an index is to be laid anew, with cells of a side that fits the lengths.
+fn needs_laying(index: &PointGrid, fitting: f32) -> bool {
+    !FITTING_CELLS.contains(&(fitting / index.cell())) || index.is_scattered()
 }
 
 #[cfg(test)]

@@ -65,7 +65,39 @@ fn a_growth_without_samples_or_drains_rests() {
     growth.run();
     assert_eq!(growth.tree(System::Arterial).len(), 1);
     assert_eq!(growth.steps_done(), 100);
+    assert!(growth.is_finished());
     assert_eq!(growth.step().systems, [SystemReport::default(); 2]);
+}
+
+#[test]
+fn a_full_tissue_ends_growth_early_and_loses_nothing_by_it() {
+    let mut settings = ColonizationSettings { steps: 3000, ..ColonizationSettings::default() };
+    for system in System::ALL {
+        settings.system_mut(system).tissue_growth = TissueGrowth::None;
+    }
+    let mut ended = growth(settings.clone());
+    ended.run();
+    let steps = ended.steps_done();
+    assert!((50..1500).contains(&steps), "ended after {steps} steps");
+    let mut stepped = growth(settings.clone());
+    while !stepped.is_finished() {
+        stepped.step();
+    }
+    let mut whole = growth(ColonizationSettings { idle_steps: 0, ..settings.clone() });
+    whole.run();
+    assert_eq!((stepped.steps_done(), whole.steps_done()), (steps, 3000));
+    for system in System::ALL {
+        assert_eq!(ended.tree(system), stepped.tree(system));
+        // Some last gaps are smaller than the samples of the idle steps could find.
+        let (nodes, all) = (ended.tree(system).len(), whole.tree(system).len());
+        assert!(nodes * 100 >= all * 95, "{} has {nodes} nodes of {all}", system.name());
+    }
+    // Where tissue grows there is always something to do again.
+    settings.steps = 60;
+    settings.arterial.tissue_growth = TissueGrowth::Table(vec![1.0; 60]);
+    let mut growing = Growth::new(disc(), ColonizationSettings { samples: 0, ..settings }, &roots(), 3).expect("valid");
+    growing.run();
+    assert_eq!(growing.steps_done(), 60);
 }
 
 /// A growth whose only drains are these.

@@ -40,6 +40,16 @@ impl TissueGrowth {
         }
     }
 
+    /// Whether the size stays as it is from the end of a step on.
+    pub(crate) fn is_over(&self, step: u32) -> bool {
+        match self {
+            Self::None => true,
+            Self::Linear(increment) => *increment == 0.0,
+            Self::Exponential(share) => *share == 0.0,
+            Self::Table(sizes) => step as usize >= sizes.len(),
+        }
+    }
+
     /// Whether every size that this law gives within `steps` steps is finite and above zero.
     pub(crate) fn check(&self, steps: u32) -> Result<(), f32> {
         let mut size = 1.0;

@@ -1,4 +1,4 @@
-//! Maps over many items, on all threads where that pays, with the same result on any number of them.
+//! Work on many items, on all threads where that pays, with the same result on any number of them.
 
 /// Fewest items worth handing to another thread, where each takes some tenths of a microsecond.
 #[cfg(feature = "parallel")]
