@@ -23,7 +23,8 @@ fn default_in_table(readme: &str, setting: &str) -> String {
 #[test]
 fn the_table_of_settings_has_the_defaults() {
     let readme = read("README.md");
-    let ColonizationSettings { steps, samples, confine, stand_off, arterial, venous } = ColonizationSettings::default();
+    let ColonizationSettings { steps, samples, idle_steps, confine, stand_off, arterial, venous } =
+        ColonizationSettings::default();
     // Taken apart, so that a setting cannot be forgotten here.
     let SystemSettings {
         direction_weight,
@@ -45,6 +46,7 @@ fn the_table_of_settings_has_the_defaults() {
     for (setting, value) in [
         ("steps", steps.to_string()),
         ("samples", samples.to_string()),
+        ("idle_steps", idle_steps.to_string()),
         ("confine", confine.to_string()),
         ("stand_off", stand_off.to_string()),
         ("direction_weight", direction_weight.to_string()),
