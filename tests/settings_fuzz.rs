@@ -96,6 +96,7 @@ fn within_limits(rng: &mut VesselRng) -> ColonizationSettings {
         arterial: system_within_limits(rng, lengths),
         venous: system_within_limits(rng, lengths),
         confine: rng.random_bool(0.5),
+        idle_steps: rng.random_range(0..=4),
         stand_off: rng.random_bool(0.5),
     }
 }
