@@ -16,7 +16,7 @@ use bevy_vessels::synthesis::{
 use std::{path::Path, sync::Arc};
 
 const ORGANS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs");
-const SEEDS: u64 = 2;
+const SEEDS: u64 = 3;
 const SAMPLES: usize = 20_000;
 /// Of an octant with fewer samples than this little is known.
 const LEAST_SAMPLES: usize = 100;
