@@ -20,8 +20,8 @@ use bevy_vessels::{
 
 /// Radius of a drop as a share of the vessel's, and the limits of it, in metres.
 const DROP_SHARE: f32 = 0.8;
-const SMALLEST: f32 = 0.000_15;
-const LARGEST: f32 = 0.000_26;
+const SMALLEST: f32 = 0.000_2;
+const LARGEST: f32 = 0.000_4;
 /// Most drops in the air.
 const MOST_DROPS: usize = 5000;
 /// Slowest blood that leaves in a jet, in m/s.
@@ -32,9 +32,9 @@ const FLOOR: f32 = -0.75;
 const CLEAR: f32 = 0.02;
 /// Seconds in which a jet breaks up into drops, and how far apart they may be that hang together until then, in metres.
 const BREAKS_UP: f32 = 0.05;
-const APART: f32 = 0.012;
+const APART: f32 = 0.005;
 /// Seconds over which the eye, or a camera, sees a drop: fast ones are streaks.
-const EXPOSURE: f32 = 0.004;
+const EXPOSURE: f32 = 0.001;
 
 /// Open ends drip, drops fall, blood runs over the organ.
 pub struct BloodPlugin;

@@ -361,7 +361,7 @@ fn grow_arteries(
         vacancy.prepare(tissue, arteries.length_scale(), arteries.forest.tree.positions(), arteries.drains.living());
     }
     candidates.draw(ground.tissue, vacancy, step, settings.samples, |candidates, refused| {
-        arteries.refuse(candidates, refused)
+        arteries.refuse(candidates, refused);
     });
     let mut born = 0;
     for candidate in candidates.iter() {
