@@ -1,9 +1,16 @@
 //! CPU time of a frame in main and render world: an empty scene, a million segments at rest, and as they grow.
 //!
-//! `cargo bench --bench idle -- [SEGMENTS]` prints milliseconds, the mean of many frames. On Linux that is the time that the
-//! threads of the app have been at work, a software driver's own threads left out; elsewhere, time on the clock. Any adapter
-//! will do: each frame begins when the last one has been drawn. One camera, one light with shadows in four cascades; the
-//! vessels are far away, so that a software driver has little to draw, but all chunks are drawn in all views.
+//! `cargo bench --bench idle -- [SEGMENTS]` prints milliseconds, the median of many frames, and how much more they are than
+//! those of an empty scene, frame for frame. Two apps run in turn, and each frame that counts follows one with vessels, so
+//! that both meet the same machine, and caches that a software driver has emptied.
+//!
+//! Times are those of all threads together, at work, so that what else runs on the machine and waiting for a graphics card
+//! don't count. Any adapter will do. What the driver does with a frame's commands, once all are there, has a column of its
+//! own: a software driver draws then, within the call that submits them and on threads of its own. On a graphics card that
+//! column is the cost of submitting.
+//!
+//! One camera, one light with shadows in four cascades; the vessels are far away, so that a software driver has little to
+//! draw, but all chunks are drawn in all views.
 
 #[expect(dead_code, reason = "no pictures are written here")]
 #[path = "../examples/common/headless.rs"]
@@ -13,7 +20,11 @@ use bevy::{
     camera::RenderTarget,
     log::LogPlugin,
     prelude::*,
-    render::{RenderApp, render_resource::PollType, renderer::RenderDevice},
+    render::{
+        RenderApp,
+        render_resource::PollType,
+        renderer::{RenderDevice, RenderGraph, RenderGraphSystems},
+    },
 };
 use bevy_vessels::{
     VesselPlugin,
@@ -21,11 +32,12 @@ use bevy_vessels::{
     render::SegmentChunk,
     synthesis::tree::{NO_PARENT, System, VesselTree},
 };
+use cpu_time::ProcessTime;
 use headless::{HOW_TO_GET_PICTURES, OffscreenPlugin, OffscreenTarget, find_adapter, headless_plugins};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-const FRAMES: u32 = 60;
-const WARM_UP: u32 = 10;
+const FRAMES: usize = 100;
+const WARM_UP: usize = 10;
 
 fn main() {
     if find_adapter().is_none() {
@@ -33,18 +45,22 @@ fn main() {
         return;
     }
     let segments = std::env::args().filter_map(|arg| arg.parse().ok()).next().unwrap_or(1_000_000);
-    let mut app = scene();
-    report("empty", &measure(&mut app, |_| {}));
-    let vessels = spawn_vessels(&mut app, segments);
-    report(&format!("{segments} segments, idle"), &measure(&mut app, |_| {}));
-    let world = app.world_mut();
-    println!("{} chunk entities", world.query::<&SegmentChunk>().iter(world).len());
+    let (mut empty, mut full) = (scene(), scene());
+    let vessels = spawn_vessels(&mut full, segments);
+    let idle = measure([&mut empty, &mut full], |_| {});
     // what a step changes in a large tree: a tenth of its segments, scattered
-    let growing = measure(&mut app, |world| {
+    let growing = measure([&mut empty, &mut full], |world| {
         let mut changes = world.get_mut::<SegmentChanges>(vessels).expect("required by the system");
         (0..segments).step_by(10).for_each(|node| changes.mark_node(node));
     });
-    report("a tenth of them changed", &growing);
+    let world = full.world_mut();
+    println!("{segments} segments in {} chunk entities", world.query::<&SegmentChunk>().iter(world).len());
+    println!("{:24}{:>9}{:>9}{:>9}{:>9}{:>9}", "ms", "main", "extract", "render", "sum", "driver");
+    report("empty", &idle[0]);
+    report("at rest", &idle[1]);
+    report("more than empty", &differences(&idle));
+    report("a tenth of them changed", &growing[1]);
+    report("more than empty", &differences(&growing));
 }
 
 /// A camera, a light with shadows, and nothing to see.
@@ -57,6 +73,7 @@ fn scene() -> App {
     ));
     app.finish();
     app.cleanup();
+    time_submission(&mut app);
     let target = app.world().resource::<OffscreenTarget>().0.clone();
     let place = Transform::from_xyz(0.0, 0.0, 40.0);
     app.world_mut().spawn((Camera3d::default(), RenderTarget::from(target), place));
@@ -81,59 +98,82 @@ fn spawn_vessels(app: &mut App, segments: usize) -> Entity {
     world.spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(System::Arterial), vessels)).id()
 }
 
-/// Mean times of main world, extraction and render world.
-type Times = [Duration; 3];
+/// Times of a frame in milliseconds, in the order of the columns.
+type Times = [f64; 5];
 
-fn measure(app: &mut App, mut change: impl FnMut(&mut World)) -> Times {
-    let mut times = Times::default();
-    for frame in 0..WARM_UP + FRAMES {
-        change(app.world_mut());
-        let taken = update(app);
-        if frame >= WARM_UP {
-            times.iter_mut().zip(taken).for_each(|(time, taken)| *time += taken);
-        }
+/// Times of frames of an empty and a full app. `change` prepares each frame of the full one.
+fn measure([empty, full]: [&mut App; 2], mut change: impl FnMut(&mut World)) -> [Vec<Times>; 2] {
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..WARM_UP + FRAMES {
+        times[0].push(update(empty));
+        change(full.world_mut());
+        update(full);
+        change(full.world_mut());
+        times[1].push(update(full));
     }
-    times.map(|time| time / FRAMES)
+    times.map(|mut times| times.split_off(WARM_UP))
 }
 
-/// [`App::update`], with a clock, and a wait for the driver at the end.
+/// [`App::update`], with a clock.
 fn update(app: &mut App) -> Times {
-    let clock = Instant::now();
-    let now = || time_at_work().unwrap_or_else(|| clock.elapsed());
     let apps = app.sub_apps_mut();
-    let start = now();
+    let start = ProcessTime::now();
     apps.main.run_default_schedule();
-    let mut taken = [now() - start, Duration::ZERO, Duration::ZERO];
+    let [mut extract, mut render] = [Duration::ZERO; 2];
+    let main = start.elapsed();
     for sub_app in apps.sub_apps.values_mut() {
-        let start = now();
+        let start = ProcessTime::now();
         sub_app.extract(apps.main.world_mut());
-        let extracted = now();
+        extract += start.elapsed();
+        let start = ProcessTime::now();
         sub_app.update();
-        taken[1] += extracted - start;
-        taken[2] += now() - extracted;
+        render += start.elapsed();
     }
     apps.main.world_mut().clear_trackers();
-    let device = app.sub_app(RenderApp).world().resource::<RenderDevice>();
-    device.poll(PollType::wait_indefinitely()).expect("the device draws");
-    taken
+    let submission = app.sub_app(RenderApp).world().resource::<Submission>().taken;
+    let render = render - submission;
+    [main, extract, render, main + extract + render, submission].map(|time| time.as_secs_f64() * 1000.0)
 }
 
-/// Time that all threads but those of a software driver have been running, where the system tells.
-fn time_at_work() -> Option<Duration> {
-    let mut nanoseconds = 0;
-    for thread in std::fs::read_dir("/proc/self/task").ok()? {
-        let thread = thread.ok()?.path();
-        let name = std::fs::read_to_string(thread.join("comm")).ok()?;
-        if !["llvmpipe", "lvp", "vk"].iter().any(|driver| name.starts_with(driver)) {
-            let times = std::fs::read_to_string(thread.join("schedstat")).ok()?;
-            nanoseconds += times.split(' ').next()?.parse::<u64>().ok()?;
-        }
+/// How long the last frame was in the hands of the driver.
+#[derive(Resource)]
+struct Submission {
+    begin: ProcessTime,
+    taken: Duration,
+}
+
+/// Takes the time from the call that hands over the frame's commands until all of them have been carried out: a software
+/// driver draws within that call and on threads of its own, and is idle in the rest of the frame.
+fn time_submission(app: &mut App) {
+    let begin = |mut submission: ResMut<Submission>| submission.begin = ProcessTime::now();
+    let end = |mut submission: ResMut<Submission>, device: Res<RenderDevice>| {
+        device.poll(PollType::wait_indefinitely()).expect("the device draws");
+        submission.taken = submission.begin.elapsed();
+    };
+    app.sub_app_mut(RenderApp)
+        .insert_resource(Submission { begin: ProcessTime::now(), taken: Duration::ZERO })
+        .add_systems(
+            RenderGraph,
+            (
+                begin.after(RenderGraphSystems::Render).before(RenderGraphSystems::Submit),
+                end.after(RenderGraphSystems::Submit).before(RenderGraphSystems::Finish),
+            ),
+        );
+}
+
+/// What each frame of the second app took longer than that of the first beside it.
+fn differences([empty, full]: &[Vec<Times>; 2]) -> Vec<Times> {
+    let difference = |(empty, full): (&Times, &Times)| std::array::from_fn(|column| full[column] - empty[column]);
+    empty.iter().zip(full).map(difference).collect()
+}
+
+/// Prints the median of each column.
+fn report(what: &str, frames: &[Times]) {
+    print!("{what:24}");
+    for column in 0..5 {
+        let mut times: Vec<f64> = frames.iter().map(|times| times[column]).collect();
+        times.sort_unstable_by(f64::total_cmp);
+        print!("{:9.3}", times[times.len() / 2]);
     }
-    Some(Duration::from_nanos(nanoseconds))
-}
-
-fn report(what: &str, times: &Times) {
-    let [main, extract, render] = times.map(|time| time.as_secs_f64() * 1000.0);
-    let sum = main + extract + render;
-    println!("{what}: main {main:.3}, extract {extract:.3}, render {render:.3}, sum {sum:.3} ms");
+    println!();
 }
