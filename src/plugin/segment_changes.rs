@@ -56,6 +56,46 @@ impl SegmentChanges {
         (self.any, self.all) = (false, false);
     }
 
+    /// Whether the segment that ends in a node counts as changed.
+    pub fn contains(&self, node: usize) -> bool {
+        self.word(node / 64) >> (node % 64) & 1 == 1
+    }
+
+    /// Number of changed nodes of a tree of `len` nodes.
+    pub fn count(&self, len: usize) -> usize {
+        if self.all {
+            return len;
+        }
+        let whole = len / 64;
+        let words = self.nodes.iter().take(whole).map(|word| word.count_ones() as usize);
+        words.sum::<usize>() + self.dirty_nodes(whole * 64..len).count()
+    }
+
+    /// The changed nodes of a range, in rising order: faster than [`dirty_ranges`](Self::dirty_ranges) where they are
+    /// scattered.
+    pub fn dirty_nodes(&self, nodes: Range<usize>) -> impl Iterator<Item = usize> + '_ {
+        let words = nodes.start / 64..nodes.end.div_ceil(64);
+        words.flat_map(move |word| {
+            let mut bits = self.word(word);
+            if word == nodes.start / 64 {
+                bits &= u64::MAX << (nodes.start % 64);
+            }
+            if word == nodes.end / 64 {
+                bits &= (1 << (nodes.end % 64)) - 1;
+            }
+            std::iter::from_fn(move || {
+                let node = (bits != 0).then(|| word * 64 + bits.trailing_zeros() as usize)?;
+                bits &= bits - 1;
+                Some(node)
+            })
+        })
+    }
+
+    /// The bits of 64 nodes.
+    fn word(&self, word: usize) -> u64 {
+        if self.all { u64::MAX } else { self.nodes.get(word).copied().unwrap_or(0) }
+    }
+
     /// Ranges of changed nodes of a tree of `len` nodes: neighbours joined, in rising order.
     ///
     /// The cost is that of a glance at 64 nodes at a time, and of the ranges.
@@ -129,6 +169,23 @@ mod tests {
         changes.clear();
         assert!(changes.is_empty());
         assert!(ranges(&changes, 1000).is_empty());
+    }
+
+    #[test]
+    fn nodes_are_those_of_the_ranges_in_any_part() {
+        let mut some = SegmentChanges::default();
+        (0..900).filter(|node| node * node % 7 == 1 || (128..256).contains(node)).for_each(|node| some.mark_node(node));
+        let mut all = some.clone();
+        all.mark_all();
+        for changes in [SegmentChanges::default(), some, all] {
+            for part in [0..0, 0..1, 0..64, 5..900, 64..128, 63..65, 130..131, 700..4000] {
+                let expected: Vec<usize> =
+                    changes.dirty_ranges(part.end).flatten().filter(|&node| node >= part.start).collect();
+                assert_eq!(changes.dirty_nodes(part.clone()).collect::<Vec<_>>(), expected, "{part:?}");
+                assert!(part.clone().all(|node| changes.contains(node) == expected.contains(&node)), "{part:?}");
+                assert_eq!(changes.count(part.end), changes.dirty_nodes(0..part.end).count(), "{part:?}");
+            }
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::{
     detail::{ChunkMeshes, FEWEST_SLOTS},
     material::{SegmentExtension, SegmentMaterial, VesselMaterials},
     stumps::Stumps,
-    upload::{SegmentWrite, SegmentWrites},
+    upload::SegmentWrites,
 };
 use crate::{
     plugin::{
@@ -13,7 +13,7 @@ use crate::{
         VesselsOf,
     },
     synthesis::{
-        instances::{SegmentColors, SegmentInstance, write_segments},
+        instances::{SegmentColors, SegmentInstance, segment_instance},
         tree::System,
     },
 };
@@ -26,7 +26,6 @@ use bevy::{
     prelude::*,
     render::storage::ShaderBuffer,
 };
-use std::ops::Range;
 
 /// What is drawn of a vessel entity: its buffer of segments, its material and its chunks.
 ///
@@ -111,12 +110,13 @@ pub(super) struct ChunkContents {
 }
 
 impl ChunkContents {
-    /// Takes in segments within a box. While vessels grow, what they were before lies within what they are now.
-    pub(super) fn add(&mut self, bounds: Option<Aabb3d>, segments: &[SegmentInstance]) {
-        let Some(new) = bounds else { return };
-        self.bounds = Some(self.bounds.map_or(new, |old| old.merge(&new)));
-        let radii = segments.iter().flat_map(SegmentInstance::radii);
-        self.thickest = radii.fold(self.thickest, f32::max);
+    /// Takes in segments. While vessels grow, what they were before lies within what they are now.
+    pub(super) fn add<'a>(&mut self, segments: impl IntoIterator<Item = &'a SegmentInstance>) {
+        for segment in segments.into_iter().filter(|segment| segment.is_visible()) {
+            let own = segment.bounds();
+            self.bounds = Some(self.bounds.map_or(own, |all| all.merge(&own)));
+            self.thickest = segment.radii().into_iter().fold(self.thickest, f32::max);
+        }
     }
 }
 
@@ -242,7 +242,7 @@ pub(super) fn update_segments(
         let changes = drawn.changes.bypass_change_detection();
         segments.adopt(look, vessels, supply, changes);
         let wounds = drawn.wounds.map(|wounds| &**wounds);
-        segments.stumps.update(wounds, vessels, &segments.colors, changes.dirty_ranges(nodes), nodes);
+        segments.stumps.update(wounds, vessels, &segments.colors, changes, nodes);
         let len = store.drawable(drawn.entity, nodes, segments);
         store.resize(segments, len);
         store.write(vessels, changes, segments, len);
@@ -320,19 +320,21 @@ impl SegmentStore<'_, '_> {
         if changes.is_all() {
             segments.contents.fill(ChunkContents::default());
         }
-        let mut write = SegmentWrite::new(segments.buffer.clone());
-        for range in changes.dirty_ranges(len) {
-            for nodes in split(range, slots) {
-                let (chunk, first) = (nodes.start / slots, write.len());
-                let out = write.extend(nodes.clone());
-                let (tree, births) = (vessels.tree(), vessels.birth_steps());
-                let bounds = write_segments(tree, births, nodes.clone(), &segments.colors, out);
-                segments.stumps.replace(nodes, out);
-                segments.contents[chunk].add(bounds, write.added_since(first));
-            }
+        let (tree, births) = (vessels.tree(), vessels.birth_steps());
+        let left_behind = len..segments.written.max(len);
+        let mut write = self.writes.begin(segments.buffer.clone(), changes.count(len) + left_behind.len());
+        for (chunk, contents) in segments.contents.iter_mut().enumerate() {
+            let nodes = changes.dirty_nodes(chunk * slots..((chunk + 1) * slots).min(len));
+            let segment = |node| {
+                let birth = births.get(node).copied().unwrap_or(0);
+                segment_instance(tree, node, birth, &segments.colors)
+            };
+            let (nodes, out) = write.add(nodes.map(|node| (node as u32, segment(node))));
+            segments.stumps.replace(nodes, out);
+            contents.add(&*out);
         }
         // what a longer tree left behind
-        write.extend(len..segments.written.max(len));
+        write.extend(left_behind);
         segments.written = len;
         self.writes.push(write);
     }
@@ -374,25 +376,5 @@ impl SegmentStore<'_, '_> {
         );
         let drawn = SegmentChunk { thickest, slots, level: 0, drawn: (0, slots) };
         Some(self.commands.spawn((drawing, drawn, aabb, NoAutoAabb, ChildOf(entity))).id())
-    }
-}
-
-/// The parts of a range that lie in one chunk each.
-fn split(range: Range<usize>, slots: usize) -> impl Iterator<Item = Range<usize>> {
-    let chunks = if range.is_empty() { 0..0 } else { range.start / slots..range.end.div_ceil(slots) };
-    chunks.map(move |chunk| range.start.max(chunk * slots)..range.end.min((chunk + 1) * slots))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_are_split_where_chunks_meet() {
-        let parts = |range: Range<usize>| split(range, 4).collect::<Vec<_>>();
-        assert_eq!(parts(1..3), [1..3]);
-        assert_eq!(parts(0..4), [0..4]);
-        assert_eq!(parts(3..9), [3..4, 4..8, 8..9]);
-        assert_eq!(parts(4..4), [0..0; 0]);
     }
 }

@@ -12,14 +12,14 @@ use super::{
     upload::SegmentWrite,
 };
 use crate::{
-    plugin::Vessels,
+    plugin::{SegmentChanges, Vessels},
     synthesis::{
         instances::{SegmentColors, SegmentInstance},
         tree::NodeId,
         wound::{Wounds, write_stumps_of},
     },
 };
-use bevy::{math::bounding::BoundingVolume, prelude::*};
+use bevy::prelude::*;
 use std::{collections::BTreeMap, ops::Range};
 
 /// The severed segments of one vessel entity, as they are drawn.
@@ -59,28 +59,29 @@ impl Stumps {
         self.slots.len().next_power_of_two().max(FEWEST_SLOTS)
     }
 
-    /// Takes in what became of the segments in ranges of nodes, and forgets those of nodes from `len` on.
+    /// Takes in what became of the segments that changed, and forgets those of nodes from `len` on.
+    ///
+    /// The cost is that of what is severed, however much else has changed.
     pub(super) fn update(
         &mut self,
         wounds: Option<&Wounds>,
         vessels: &Vessels,
         colors: &SegmentColors,
-        changed: impl Iterator<Item = Range<usize>>,
+        changes: &SegmentChanges,
         len: usize,
     ) {
+        let is_healed = |node: NodeId| changes.contains(node.index()) && wounds.is_none_or(|all| !all.is_severed(node));
+        let known = self.severed.keys().map(|&node| NodeId(node));
+        let gone: Vec<NodeId> = known.filter(|&node| node.index() >= len || is_healed(node)).collect();
+        for node in gone {
+            self.remove(node);
+        }
+        let Some(wounds) = wounds else { return };
         let mut pieces = Vec::new();
-        for nodes in changed.chain([len..u32::MAX as usize]) {
-            let known = self.severed.range(nodes.start as u32..nodes.end as u32).map(|(&node, _)| NodeId(node));
-            let healed = known.filter(|&node| node.index() >= len || wounds.is_none_or(|all| !all.is_severed(node)));
-            for node in healed.collect::<Vec<_>>() {
-                self.remove(node);
-            }
-            let Some(wounds) = wounds else { continue };
-            for node in wounds.severed_within(nodes).take_while(|node| node.index() < len) {
-                pieces.clear();
-                write_stumps_of(wounds, node, vessels.tree(), vessels.birth_steps(), colors, &mut pieces);
-                self.insert(node, &pieces);
-            }
+        for node in wounds.severed_within(0..len).filter(|node| changes.contains(node.index())) {
+            pieces.clear();
+            write_stumps_of(wounds, node, vessels.tree(), vessels.birth_steps(), colors, &mut pieces);
+            self.insert(node, &pieces);
         }
     }
 
@@ -128,10 +129,13 @@ impl Stumps {
         }
     }
 
-    /// Puts the first pieces in place of the segments in `out`, which are those of `nodes`.
-    pub(super) fn replace(&self, nodes: Range<usize>, out: &mut [SegmentInstance]) {
-        for (&node, severed) in self.severed.range(nodes.start as u32..nodes.end as u32) {
-            out[node as usize - nodes.start] = severed.own;
+    /// Puts the first pieces in place of the segments in `out`, which are those of `nodes`, in rising order.
+    pub(super) fn replace(&self, nodes: &[u32], out: &mut [SegmentInstance]) {
+        let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else { return };
+        for (node, severed) in self.severed.range(first..=last) {
+            if let Ok(at) = nodes.binary_search(node) {
+                out[at] = severed.own;
+            }
         }
     }
 
@@ -181,10 +185,8 @@ impl SegmentStore<'_, '_> {
         chunks.dedup();
         for chunk in chunks {
             let slots = segments.stumps.slots[chunk * FEWEST_SLOTS..].iter().take(FEWEST_SLOTS);
-            let visible: Vec<SegmentInstance> = slots.filter(|segment| segment.is_visible()).copied().collect();
-            let bounds = visible.iter().map(SegmentInstance::bounds).reduce(|a, b| a.merge(&b));
             let mut contents = ChunkContents::default();
-            contents.add(bounds, &visible);
+            contents.add(slots);
             let known = segments.stumps.chunks.get(chunk).copied();
             let at = first + chunk * FEWEST_SLOTS;
             let spawned = self.fit_chunk((entity, segments), known, at, &contents, FEWEST_SLOTS);

@@ -47,17 +47,25 @@ impl SegmentWrite {
         self.segments.len()
     }
 
+    /// Adds segments with their slots, and gives what was added.
+    pub(super) fn add(
+        &mut self,
+        segments: impl Iterator<Item = (u32, SegmentInstance)>,
+    ) -> (&[u32], &mut [SegmentInstance]) {
+        let first = self.len();
+        segments.for_each(|(slot, segment)| {
+            self.slots.push(slot);
+            self.segments.push(segment);
+        });
+        (&self.slots[first..], &mut self.segments[first..])
+    }
+
     /// Adds hidden segments for a range of slots, to be filled in.
     pub(super) fn extend(&mut self, slots: Range<usize>) -> &mut [SegmentInstance] {
         let first = self.len();
         self.segments.resize(first + slots.len(), SegmentInstance::HIDDEN);
         self.slots.extend(slots.map(|slot| slot as u32));
         &mut self.segments[first..]
-    }
-
-    /// Segments added after the first so many.
-    pub(super) fn added_since(&self, first: usize) -> &[SegmentInstance] {
-        &self.segments[first..]
     }
 
     /// The slots, if they follow one another.
@@ -74,22 +82,53 @@ impl SegmentWrite {
 
 /// Writes that wait: in the main world for extraction, in the render world for their buffer to be there.
 #[derive(Resource, Debug, Default)]
-pub(super) struct SegmentWrites(Vec<SegmentWrite>);
+pub(super) struct SegmentWrites {
+    queued: Vec<SegmentWrite>,
+    /// Memory of writes that are done. A large tree changes in each frame by some megabytes, which would have to be got
+    /// from the system each time.
+    spare: Vec<SegmentWrite>,
+}
 
 impl SegmentWrites {
+    /// Segments that spare memory has room for at most: 14 MB. What is written at once, now and then, isn't kept.
+    const MOST_SPARE: usize = 1 << 18;
+
+    /// A write with room for so many segments.
+    pub(super) fn begin(&mut self, buffer: Handle<ShaderBuffer>, len: usize) -> SegmentWrite {
+        let mut write = self.spare.pop().unwrap_or_else(|| SegmentWrite::new(Handle::default()));
+        write.buffer = buffer;
+        write.slots.reserve_exact(len);
+        write.segments.reserve_exact(len);
+        write
+    }
+
     /// Queues a write, unless there is nothing in it.
     pub(super) fn push(&mut self, write: SegmentWrite) {
         if write.len() > 0 {
-            self.0.push(write);
+            self.queued.push(write);
+        }
+    }
+
+    /// Keeps the memory of a write that is done.
+    fn recycle(&mut self, mut write: SegmentWrite) {
+        let kept: usize = self.spare.iter().map(|spare| spare.segments.capacity()).sum();
+        if kept + write.segments.capacity() <= Self::MOST_SPARE {
+            write.buffer = Handle::default();
+            write.slots.clear();
+            write.segments.clear();
+            self.spare.push(write);
         }
     }
 }
 
-/// Moves queued writes to the render world.
+/// Moves queued writes to the render world, and memory back.
 pub(super) fn extract_writes(mut main: ResMut<MainWorld>, mut writes: ResMut<SegmentWrites>) {
-    let mut queued = main.resource_mut::<SegmentWrites>();
-    if !queued.0.is_empty() {
-        writes.0.append(&mut queued.0);
+    let mut main = main.resource_mut::<SegmentWrites>();
+    if !main.queued.is_empty() {
+        writes.queued.append(&mut main.queued);
+    }
+    if !writes.spare.is_empty() {
+        main.spare = std::mem::take(&mut writes.spare);
     }
 }
 
@@ -131,12 +170,12 @@ pub(super) fn write_segments_to_gpu(
     cache: Res<PipelineCache>,
     (device, queue): (Res<RenderDevice>, Res<RenderQueue>),
 ) {
-    if writes.0.is_empty() {
+    if writes.queued.is_empty() {
         return;
     }
     let pipeline = cache.get_compute_pipeline(scatter.pipeline);
     let mut waiting = Vec::new();
-    writes.0.retain(|write| {
+    for write in std::mem::take(&mut writes.queued) {
         let bytes = (write.end() * SegmentInstance::SIZE) as u64;
         let room = buffers.get(&write.buffer).map(|gpu| &gpu.buffer).filter(|buffer| bytes <= buffer.size());
         // what was queued earlier is written earlier: a later write may replace parts of it
@@ -147,16 +186,18 @@ pub(super) fn write_segments_to_gpu(
                 true
             }
             (Some(buffer), None, Some(pipeline)) => {
-                scatter.run(pipeline, write, buffer, &cache, &device, &queue);
+                scatter.run(pipeline, &write, buffer, &cache, &device, &queue);
                 true
             }
             _ => false,
         };
-        if !written {
+        if written {
+            writes.recycle(write);
+        } else {
             waiting.push(write.buffer.id());
+            writes.queued.push(write);
         }
-        !written
-    });
+    }
 }
 
 impl ScatterPipeline {
@@ -210,6 +251,6 @@ mod tests {
         assert_eq!((write(&[3..5, 6..9]).run(), write(&[3..5, 6..9]).end()), (None, 9));
         assert_eq!(write(&[5..6, 4..5]).run(), None);
         assert_eq!((write(&[]).run(), write(&[]).end()), (None, 0));
-        assert!(write(&[0..2]).added_since(0).iter().all(|segment| *segment == SegmentInstance::HIDDEN));
+        assert!(write(&[0..2]).segments.iter().all(|segment| *segment == SegmentInstance::HIDDEN));
     }
 }
