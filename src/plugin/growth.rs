@@ -76,7 +76,7 @@ pub struct GrowthFrame {
     pub steps: u32,
     /// Time for starting growths: copies of meshes, and the planting of roots. Tissues are prepared beside the frames.
     pub start_time: Duration,
-    /// Time for the steps.
+    /// Time for the steps, and for the radii that follow from them.
     pub step_time: Duration,
     /// Time for bringing vessel entities up to date.
     pub publish_time: Duration,
@@ -139,6 +139,9 @@ pub(crate) fn grow(
             state.may_step(*control).then(|| state.expected_cost())
         },
     );
+    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.is_unsettled()) {
+        settle(&mut state, &mut progress);
+    }
     frame.steps += steps;
     frame.step_time += start.elapsed();
 }
@@ -166,6 +169,15 @@ fn step(state: &mut GrowthState, progress: &mut GrowthProgress) {
     *progress = GrowthProgress::of(GrowthPhase::Growing, state.growth(), grow_time);
 }
 
+/// Brings an organ's radii up to date with its steps.
+fn settle(state: &mut GrowthState, progress: &mut GrowthProgress) {
+    let start = Instant::now();
+    state.settle();
+    let cost = start.elapsed();
+    state.note_settling(cost);
+    progress.grow_time += cost;
+}
+
 /// Does all remaining steps of an organ that has its tissue, and says how many they were.
 pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
     if state.growth().is_none() || is_done(state) {
@@ -191,7 +203,7 @@ pub(crate) fn is_done(state: &GrowthState) -> bool {
 pub(crate) struct StepCost {
     /// The step itself.
     pub(crate) step: Duration,
-    /// Publishing what it changed, later in the frame.
+    /// Settling the radii and publishing what it changed, later in the frame.
     pub(crate) publish: Duration,
 }
 

@@ -57,6 +57,8 @@ pub struct GrowthState {
     granted: u32,
     /// Whether all remaining steps are to be done at once.
     pub(crate) finish: bool,
+    /// Whether steps were done whose radii are not known yet.
+    unsettled: bool,
     /// Nodes whose radius changed since the vessels were last published.
     changed: [Vec<u32>; 2],
     /// Whether the vessels are to be published anew, from the first node on.
@@ -68,8 +70,10 @@ pub struct GrowthState {
 #[derive(Debug, Default)]
 struct Costs {
     steps: LastCosts,
-    /// Publishing, for each step that was published.
+    /// Settling and publishing, for each step that was published.
     publishing: LastCosts,
+    /// Settling, since the vessels were last published.
+    settling: Duration,
     /// Steps that haven't been published.
     unpublished: u32,
 }
@@ -237,14 +241,33 @@ impl GrowthState {
         willing && self.growth.as_ref().is_some_and(|growth| !growth.is_finished())
     }
 
-    /// Does one step and remembers what it changed. Without a growth, or at its end, nothing is done.
+    /// Does one step, whose radii are to be [settled](Self::settle). Without a growth, or at its end, nothing is done.
     pub(crate) fn step(&mut self) {
         let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { return };
-        growth.step();
+        growth.advance();
         self.granted = self.granted.saturating_sub(1);
+        self.unsettled = true;
+    }
+
+    /// Whether there are steps whose radii are to be settled.
+    pub(crate) fn is_unsettled(&self) -> bool {
+        self.unsettled
+    }
+
+    /// Renews the radii after a frame's last step, and remembers what the steps changed. Many steps change the same radii,
+    /// those of the trunks: once is enough.
+    pub(crate) fn settle(&mut self) {
+        self.unsettled = false;
+        let Some(growth) = self.growth.as_mut() else { return };
+        growth.settle();
         for system in System::ALL {
             self.changed[system.index()].extend_from_slice(growth.changed_radii(system));
         }
+    }
+
+    /// Takes note of what settling cost.
+    pub(crate) fn note_settling(&mut self, cost: Duration) {
+        self.costs.settling += cost;
     }
 
     /// Takes note of what a step cost.
@@ -291,6 +314,7 @@ impl GrowthState {
 
     /// Forgets what has been published, at this cost.
     pub(crate) fn clear_news(&mut self, cost: Duration) {
+        let cost = cost + std::mem::take(&mut self.costs.settling);
         if let Some(each) = cost.checked_div(std::mem::take(&mut self.costs.unpublished)) {
             self.costs.publishing.add(each);
         }

@@ -137,7 +137,12 @@ fn taking_the_mesh_away_waits_for_another() {
 /// Copies what is marked, as a renderer does: then the copy is right, and nothing was marked for nothing.
 #[test]
 fn segment_changes_are_exactly_what_a_copy_needs() {
-    let mut app = headless(GrowthBudget::Steps(1));
+    [1, 7].into_iter().for_each(assert_changes_exact);
+}
+
+/// Grows with so many steps a frame.
+fn assert_changes_exact(steps: u32) {
+    let mut app = headless(GrowthBudget::Steps(steps));
     let mut wish = quick();
     wish.settings = wish.settings.scaled(0.6);
     wish.settings.steps = 150;
