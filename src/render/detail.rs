@@ -3,8 +3,9 @@
 //! In: the chunks' boxes and thickest radii, and the cameras. Out: each chunk's mesh.
 //!
 //! Nothing pops, by construction. As a segment gets small, the vertex stage slides the corners of its cross-section to
-//! those of the next coarser polygon, each vertex by the size of its own end; a chunk goes to the coarser mesh when all its
-//! vertices have slid all the way, so that both meshes are the same surface. Below a pixel, segments drop out one by one,
+//! those of the next coarser polygon, and from there to those of the one after it, each vertex by the size of its own end;
+//! a chunk goes to the coarser mesh when all its vertices have slid to it, or beyond as those of its thinnest segments
+//! have, so that both meshes are the same surface. Below a pixel, segments drop out one by one,
 //! and those that are kept are widened, so that vessels cover the same area (Cook, Halstead, Planck & Ryu, "Stochastic
 //! simplification of aggregate detail", 2007); a chunk leaves those out of its mesh whose width has become zero.
 //! Which slots drop first is decided by multiples of the golden ratio, which spread evenly over any run of slots, and over
@@ -65,16 +66,22 @@ impl Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Level {
     pub(super) shape: Shape,
-    /// What the level's vertices slide to: the shape of the next coarser one. Its own at the end.
-    pub(super) next: Shape,
+    /// What the level's vertices slide to, one after the other.
+    pub(super) goals: Vec<Goal>,
     /// One of about this many slots is in the mesh.
     pub(super) stride: usize,
     /// Radius in pixels below which a chunk may be drawn at this level.
     pub(super) drawn_below: f32,
-    /// Radius in pixels below which vertices have slid all the way; they begin at twice that. 0: they don't.
-    pub(super) slid_below: f32,
     /// Width in pixels below which segments drop out. 0: they don't.
     pub(super) least_width: f32,
+}
+
+/// A coarser shape that vertices slide to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Goal {
+    pub(super) shape: Shape,
+    /// Radius in pixels below which vertices have arrived; they set out at twice that. 0: they don't.
+    pub(super) slid_below: f32,
 }
 
 impl Level {
@@ -114,7 +121,7 @@ impl Detail {
         let shapes: Vec<Shape> = std::iter::once(finest).chain(coarser).collect();
         let level = |shape: Shape, stride, drawn_below| {
             let least_width = self.least_width;
-            Level { shape, next: shape, stride, drawn_below, slid_below: 0.0, least_width }
+            Level { shape, goals: Vec::new(), stride, drawn_below, least_width }
         };
         let mut levels: Vec<Level> =
             shapes.iter().map(|&shape| level(shape, 1, self.tolerance / shape.error())).collect();
@@ -123,10 +130,11 @@ impl Detail {
         levels.extend(STRIDES.map(|stride| level(last, stride, self.dropped_below(stride))));
         for finer in 0..levels.len() - 1 {
             levels[finer + 1].drawn_below = levels[finer + 1].drawn_below.min(levels[finer].drawn_below);
-            levels[finer].next = levels[finer + 1].shape;
-            if levels[finer].next != levels[finer].shape {
-                levels[finer].slid_below = levels[finer + 1].drawn_below;
-            }
+        }
+        for finer in 0..shapes.len() {
+            let coarser = &levels[finer + 1..shapes.len()];
+            let goals = coarser.iter().map(|level| Goal { shape: level.shape, slid_below: level.drawn_below });
+            levels[finer].goals = goals.collect();
         }
         levels
     }
@@ -239,10 +247,12 @@ mod tests {
             assert_eq!((levels[0].shape, levels[0].drawn_below), (shape, f32::INFINITY));
             for pair in levels.windows(2) {
                 assert!(pair[0].drawn_below > pair[1].drawn_below, "{pair:?}");
-                assert_eq!(pair[0].next, pair[1].shape);
-                assert!(pair[0].shape == pair[1].shape || pair[0].slid_below == pair[1].drawn_below);
-                // vertices begin to slide at twice the size at which they arrive: not before a chunk changes to their level
-                assert!(2.0 * pair[1].slid_below <= pair[1].drawn_below);
+                if pair[0].shape != pair[1].shape {
+                    assert_eq!(pair[0].goals[0], Goal { shape: pair[1].shape, slid_below: pair[1].drawn_below });
+                    assert_eq!(pair[0].goals[1..], pair[1].goals, "from there on they go together");
+                }
+                // vertices set out at twice the size at which they arrive: not before they have arrived at the goal before
+                assert!(pair[0].goals.windows(2).all(|goals| 2.0 * goals[1].slid_below <= goals[0].slid_below));
                 let [fine, coarse] = [0, 1].map(|i| pair[i].shape.vertices() * 1000 / pair[i].stride);
                 assert!(coarse < fine, "{pair:?}");
             }
@@ -264,7 +274,7 @@ mod tests {
     fn without_tolerance_and_least_width_there_is_one_level() {
         let meshes = ChunkMeshes::new(&Detail { tolerance: 0.0, least_width: 0.0, ..DETAIL });
         assert!([0.0, 1e-9, 1.0, 1e9, f32::INFINITY].iter().all(|&radius| meshes.level(0, radius) == 0));
-        assert!(meshes.levels.iter().all(|level| level.slid_below == 0.0));
+        assert!(meshes.levels.iter().flat_map(|level| &level.goals).all(|goal| goal.slid_below == 0.0));
     }
 
     #[test]

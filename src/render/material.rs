@@ -1,6 +1,6 @@
 //! What segments are made of: Bevy's standard material, with a vertex stage that pulls segments from a buffer.
 
-use super::template::ATTRIBUTE_DETAIL;
+use super::template::{ATTRIBUTE_DETAIL, ATTRIBUTE_SECOND_GOAL, ATTRIBUTE_THIRD_GOAL};
 use crate::synthesis::tree::System;
 use bevy::{
     asset::embedded_path,
@@ -60,6 +60,8 @@ impl MaterialExtension for SegmentExtension {
             Mesh::ATTRIBUTE_UV_0.at_shader_location(1),
             Mesh::ATTRIBUTE_NORMAL.at_shader_location(2),
             ATTRIBUTE_DETAIL.at_shader_location(3),
+            ATTRIBUTE_SECOND_GOAL.at_shader_location(4),
+            ATTRIBUTE_THIRD_GOAL.at_shader_location(5),
         ])?];
         // the colour comes out of our vertex stage although the mesh has no such attribute
         descriptor.vertex.shader_defs.push("VERTEX_COLORS".into());

@@ -5,7 +5,7 @@
 // the chunk starts at the mesh tag. Slots without length or thickness collapse to a point and draw nothing. An end with a
 // negative radius was cut: it is flat, and shows its wall and its lumen.
 //
-// As a segment gets small in the picture, its vertices slide to the corners of the next coarser level, and below a pixel
+// As a segment gets small in the picture, its vertices slide to the corners of the coarser levels, and below a pixel
 // segments drop out one by one while the others get wider: see `detail.rs`.
 
 #import bevy_pbr::{
@@ -36,11 +36,14 @@ struct TemplateVertex {
     @location(0) around: vec3<f32>,
     // segment within the chunk; latitude within the round end, 0 at its rim and 1 at its pole
     @location(1) place: vec2<f32>,
-    // where the vertex slides: cosine and sine, latitude
-    @location(2) coarse: vec3<f32>,
-    // radius in pixels below which it has slid all the way; most segments kept, as a share; width in pixels below which
+    // where the vertex slides first: cosine and sine, latitude
+    @location(2) first_goal: vec3<f32>,
+    // radius in pixels below which it has arrived there; most segments kept, as a share; width in pixels below which
     // segments drop out
     @location(3) detail: vec3<f32>,
+    // where it slides then, and the radius in pixels below which it has arrived
+    @location(4) second_goal: vec4<f32>,
+    @location(5) third_goal: vec4<f32>,
 }
 
 struct SurfacePoint {
@@ -86,6 +89,13 @@ fn pixels_per_length(world_from_local: mat4x4<f32>, world: vec3<f32>) -> f32 {
     let squared = max(dot(axes[0], axes[0]), max(dot(axes[1], axes[1]), dot(axes[2], axes[2])));
     // behind the camera and at it, everything is large
     return 0.5 * view.viewport.w * abs(view.clip_from_view[1][1]) * sqrt(squared) / max(depth, 1e-12);
+}
+
+// Slides a vertex towards a goal, by the radius of its end in pixels: it sets out at twice the radius at which it arrives.
+fn slide(place: vec3<f32>, goal: vec3<f32>, radius: f32, slid_below: f32) -> vec3<f32> {
+    let slid = saturate(2.0 - radius / max(slid_below, 1e-12));
+    // at the end exactly there, which `mix` doesn't promise
+    return select(mix(place, goal, slid), goal, slid == 1.0);
 }
 
 // How much wider than itself an end is drawn: 1 while it is thick enough to be seen. Below that, a share of all segments
@@ -143,10 +153,12 @@ fn vertex(in: TemplateVertex) -> VertexOutput {
     let center = mix(segment.start, segment.end, in.around.z);
     let world_center = mesh_functions::mesh_position_local_to_world(world_from_local, vec4(center, 1.0)).xyz;
     let radius = mix(abs(segment.start_radius), abs(segment.end_radius), in.around.z) * pixels_per_length(world_from_local, world_center);
-    let slid = saturate(2.0 - radius / max(in.detail.x, 1e-12));
-    // at the end exactly there, which `mix` doesn't promise
-    let across = select(mix(in.around.xy, in.coarse.xy, slid), in.coarse.xy, slid == 1.0);
-    let latitude = select(mix(in.place.y, in.coarse.z, slid), in.coarse.z, slid == 1.0);
+    var across_and_latitude = vec3(in.around.xy, in.place.y);
+    across_and_latitude = slide(across_and_latitude, in.first_goal, radius, in.detail.x);
+    across_and_latitude = slide(across_and_latitude, in.second_goal.xyz, radius, in.second_goal.w);
+    across_and_latitude = slide(across_and_latitude, in.third_goal.xyz, radius, in.third_goal.w);
+    let across = across_and_latitude.xy;
+    let latitude = across_and_latitude.z;
 
     // a mirroring transform turns triangles inside out; running around the other way turns them back
     let mirror = mesh_functions::sign_determinant_model_3x3m(mesh[in.instance_index].flags);

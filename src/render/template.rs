@@ -5,14 +5,15 @@
 //! | attribute | holds |
 //! |---|---|
 //! | position | cosine and sine around the axis, and the end: 0 at the start, 1 at the far one |
-//! | normal | where the vertex slides as its segment gets small: cosine, sine, latitude |
+//! | normal | where the vertex slides first as its segment gets small: cosine, sine, latitude |
 //! | texture coordinate | slot within the chunk; latitude within the round end, 0 at its rim and 1 at its pole |
-//! | [`ATTRIBUTE_DETAIL`] | [`Level::slid_below`], [`Level::most_kept`], [`Level::least_width`] |
+//! | [`ATTRIBUTE_DETAIL`] | radius in pixels below which it has arrived there; [`Level::most_kept`], [`Level::least_width`] |
+//! | [`ATTRIBUTE_SECOND_GOAL`], [`ATTRIBUTE_THIRD_GOAL`] | where it slides then: cosine, sine, latitude, radius |
 //!
-//! A level's vertices, slid all the way, make the next coarser level, vertex for vertex. So a chunk can go from one mesh to
-//! the next without a visible change.
+//! A level's vertices, slid to the next coarser one, are that level, vertex for vertex, and slide on as its own do. So a
+//! chunk can go from one mesh to the next without a visible change, however thick and thin its segments are.
 
-use super::detail::Level;
+use super::detail::{Goal, Level, Shape};
 use bevy::{
     asset::RenderAssetUsages,
     math::ops,
@@ -24,6 +25,14 @@ use std::f32::consts::TAU;
 pub(super) const ATTRIBUTE_DETAIL: MeshVertexAttribute =
     MeshVertexAttribute::new("SegmentDetail", 0x7e55_e15d_e7a1, VertexFormat::Float32x3);
 
+/// Where a vertex slides from its first goal.
+pub(super) const ATTRIBUTE_SECOND_GOAL: MeshVertexAttribute =
+    MeshVertexAttribute::new("SegmentSecondGoal", 0x7e55_e15d_e7a2, VertexFormat::Float32x4);
+
+/// Where a vertex slides from its second goal.
+pub(super) const ATTRIBUTE_THIRD_GOAL: MeshVertexAttribute =
+    MeshVertexAttribute::new("SegmentThirdGoal", 0x7e55_e15d_e7a3, VertexFormat::Float32x4);
+
 /// Builds a mesh of `slots` segments at a level of detail; of those, the ones that the level keeps.
 ///
 /// The near end has a plain cap: it sits in the round end of the parent segment, and is seen at roots only.
@@ -32,28 +41,34 @@ pub(super) fn chunk_mesh(level: &Level, slots: usize) -> Mesh {
     for slot in (0..slots).filter(|&slot| level.keeps(slot)) {
         template.push_segment(slot as f32);
     }
-    let detail = vec![[level.slid_below, level.most_kept(), level.least_width]; template.around.len()];
+    let [first, second, third] = template.goals;
+    let coarse: Vec<[f32; 3]> = first.iter().map(|&[cos, sin, latitude, _]| [cos, sin, latitude]).collect();
+    let detail: Vec<[f32; 3]> =
+        first.iter().map(|&[.., slid_below]| [slid_below, level.most_kept(), level.least_width]).collect();
     // the shapes exist on the GPU alone: a copy in the main world would only mislead picking and bounding boxes
     Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, template.around)
         // the shader knows the true normals, but Bevy's normal prepass expects the attribute
-        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, template.coarse)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, coarse)
         .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, template.place)
         .with_inserted_attribute(ATTRIBUTE_DETAIL, detail)
+        .with_inserted_attribute(ATTRIBUTE_SECOND_GOAL, second)
+        .with_inserted_attribute(ATTRIBUTE_THIRD_GOAL, third)
         .with_inserted_indices(Indices::U32(template.indices))
 }
 
 struct Template<'a> {
     level: &'a Level,
     around: Vec<[f32; 3]>,
-    coarse: Vec<[f32; 3]>,
+    /// Where vertices slide, and the radius in pixels below which they have arrived.
+    goals: [Vec<[f32; 4]>; MOST_GOALS],
     place: Vec<[f32; 2]>,
     indices: Vec<u32>,
 }
 
 impl<'a> Template<'a> {
     fn new(level: &'a Level) -> Self {
-        Self { level, around: Vec::new(), coarse: Vec::new(), place: Vec::new(), indices: Vec::new() }
+        Self { level, around: Vec::new(), goals: Default::default(), place: Vec::new(), indices: Vec::new() }
     }
 
     fn push_segment(&mut self, slot: f32) {
@@ -73,31 +88,27 @@ impl<'a> Template<'a> {
     }
 
     fn push_pole(&mut self, slot: f32, end: f32) -> u32 {
-        self.push_vertex(slot, [1.0, 0.0, end], 1.0, [1.0, 0.0, 1.0])
+        let goals =
+            std::array::from_fn(|goal| [1.0, 0.0, 1.0, self.level.goals.get(goal).map_or(0.0, |goal| goal.slid_below)]);
+        self.push_vertex(slot, [1.0, 0.0, end], 1.0, goals)
     }
 
     /// A ring of vertices, counter-clockwise seen from the far end; returns its first index.
     fn push_ring(&mut self, slot: f32, end: f32, cap_ring: u32) -> u32 {
         let first = self.around.len() as u32;
-        let (own, next) = (self.level.shape, self.level.next);
-        let latitude = cap_ring as f32 / (own.cap_rings + 1) as f32;
-        // the ring of the coarser cap at or below this one
-        let coarse_ring = cap_ring * (next.cap_rings + 1) / (own.cap_rings + 1);
-        let coarse_latitude = coarse_ring as f32 / (next.cap_rings + 1) as f32;
+        let own = self.level.shape;
         for side in 0..own.sides {
-            let [cos, sin] = corner(side, own.sides);
-            // the nearest corner of the coarser polygon: every one of its corners is some vertex's goal, in the same order
-            let goal = (2 * side * next.sides + own.sides) / (2 * own.sides) % next.sides;
-            let [coarse_cos, coarse_sin] = corner(goal, next.sides);
-            self.push_vertex(slot, [cos, sin, end], latitude, [coarse_cos, coarse_sin, coarse_latitude]);
+            let place = RingPlace { side, cap_ring };
+            let [cos, sin, latitude] = place.on(own);
+            self.push_vertex(slot, [cos, sin, end], latitude, place.goals(own, &self.level.goals));
         }
         first
     }
 
-    fn push_vertex(&mut self, slot: f32, around: [f32; 3], latitude: f32, coarse: [f32; 3]) -> u32 {
+    fn push_vertex(&mut self, slot: f32, around: [f32; 3], latitude: f32, goals: [[f32; 4]; MOST_GOALS]) -> u32 {
         let index = self.around.len() as u32;
         self.around.push(around);
-        self.coarse.push(coarse);
+        self.goals.iter_mut().zip(goals).for_each(|(all, goal)| all.push(goal));
         self.place.push([slot, latitude]);
         index
     }
@@ -119,6 +130,45 @@ impl<'a> Template<'a> {
             let (a, b) = (ring + side, ring + (side + 1) % sides);
             self.indices.extend(if near_end { [pole, b, a] } else { [pole, a, b] });
         }
+    }
+}
+
+/// Coarser shapes that a level can have.
+const MOST_GOALS: usize = 3;
+
+/// A corner of a ring.
+#[derive(Clone, Copy)]
+struct RingPlace {
+    side: u32,
+    cap_ring: u32,
+}
+
+impl RingPlace {
+    /// Cosine, sine and latitude.
+    fn on(self, shape: Shape) -> [f32; 3] {
+        let [cos, sin] = corner(self.side, shape.sides);
+        [cos, sin, self.cap_ring as f32 / (shape.cap_rings + 1) as f32]
+    }
+
+    /// The nearest corner of a coarser polygon, on the ring of its cap at or below this one: every one of its corners is the
+    /// goal of some corner, in the same order.
+    fn goal(self, own: Shape, next: Shape) -> Self {
+        Self {
+            side: (2 * self.side * next.sides + own.sides) / (2 * own.sides) % next.sides,
+            cap_ring: self.cap_ring * (next.cap_rings + 1) / (own.cap_rings + 1),
+        }
+    }
+
+    /// Where it slides, from shape to shape. It stays where there is none left.
+    fn goals(mut self, mut own: Shape, goals: &[Goal]) -> [[f32; 4]; MOST_GOALS] {
+        std::array::from_fn(|goal| {
+            let mut slid_below = 0.0;
+            if let Some(goal) = goals.get(goal) {
+                (self, own, slid_below) = (self.goal(own, goal.shape), goal.shape, goal.slid_below);
+            }
+            let [cos, sin, latitude] = self.on(own);
+            [cos, sin, latitude, slid_below]
+        })
     }
 }
 
@@ -158,11 +208,14 @@ mod tests {
 
     fn attribute(mesh: &Mesh, attribute: MeshVertexAttribute) -> Vec<Vec3> {
         match mesh.attribute(attribute) {
+            Some(VertexAttributeValues::Float32x4(values)) => {
+                values.iter().map(|v| Vec3::new(v[0], v[1], v[2])).collect()
+            }
             Some(VertexAttributeValues::Float32x3(values)) => values.iter().copied().map(Vec3::from).collect(),
             Some(VertexAttributeValues::Float32x2(values)) => {
                 values.iter().map(|v| Vec3::new(v[0], v[1], 0.0)).collect()
             }
-            _ => panic!("two or three floats"),
+            _ => panic!("two to four floats"),
         }
     }
 
@@ -204,12 +257,14 @@ mod tests {
 
     /// A triangle as three points in the space of the template: around, latitude, slot. Those without area are left out.
     type Corner = [i32; 5];
-    fn surface(mesh: &Mesh, slid: bool, kept: impl Fn(usize) -> bool) -> BTreeSet<[Corner; 3]> {
-        let [around, coarse, place] =
-            [Mesh::ATTRIBUTE_POSITION, Mesh::ATTRIBUTE_NORMAL, Mesh::ATTRIBUTE_UV_0].map(|a| attribute(mesh, a));
+    /// After so many slides.
+    fn surface(mesh: &Mesh, slides: usize, kept: impl Fn(usize) -> bool) -> BTreeSet<[Corner; 3]> {
+        let [around, place] = [Mesh::ATTRIBUTE_POSITION, Mesh::ATTRIBUTE_UV_0].map(|a| attribute(mesh, a));
+        let goals = [Mesh::ATTRIBUTE_NORMAL, ATTRIBUTE_SECOND_GOAL, ATTRIBUTE_THIRD_GOAL].map(|a| attribute(mesh, a));
         let corner = |i: u32| {
             let i = i as usize;
-            let (across, latitude) = if slid { (coarse[i], coarse[i].z) } else { (around[i], place[i].y) };
+            let goal = slides.checked_sub(1).map(|slide| goals[slide][i]);
+            let (across, latitude) = goal.map_or((around[i], place[i].y), |goal| (goal, goal.z));
             // all points of a cap with latitude 1 are its pole
             let across = if latitude == 1.0 { Vec3::ZERO } else { across };
             let exact = |x: f32| (x * 1e4).round() as i32;
@@ -228,13 +283,28 @@ mod tests {
     }
 
     #[test]
-    fn a_level_slid_all_the_way_is_the_next_level() {
-        for pair in levels().windows(2).filter(|pair| pair[0].next == pair[1].shape && pair[1].stride >= pair[0].stride)
-        {
+    fn a_level_after_a_slide_is_the_next_level() {
+        let levels = levels();
+        for (at, fine) in levels.iter().enumerate() {
+            let mesh = chunk_mesh(fine, 16 * SLOTS);
+            for (slides, coarse) in levels[at..].iter().enumerate().take(fine.goals.len() + 1) {
+                let coarse_mesh = chunk_mesh(coarse, 16 * SLOTS);
+                assert_eq!(
+                    surface(&mesh, slides, |_| true),
+                    surface(&coarse_mesh, 0, |_| true),
+                    "{fine:?} to {coarse:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_level_without_what_drops_out_is_the_next_level() {
+        for pair in levels().windows(2).filter(|pair| pair[1].stride > pair[0].stride) {
             let [fine, coarse] = [&pair[0], &pair[1]].map(|level| chunk_mesh(level, 16 * SLOTS));
-            let slid = surface(&fine, true, |slot| pair[1].keeps(slot));
-            assert!(!slid.is_empty());
-            assert_eq!(slid, surface(&coarse, false, |_| true), "{:?} to {:?}", pair[0], pair[1]);
+            let kept = surface(&fine, 0, |slot| pair[1].keeps(slot));
+            assert!(!kept.is_empty());
+            assert_eq!(kept, surface(&coarse, 0, |_| true), "{:?} to {:?}", pair[0], pair[1]);
         }
     }
 

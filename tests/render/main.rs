@@ -9,6 +9,7 @@
 mod headless;
 
 mod detail;
+mod flight;
 mod stage;
 mod wounds;
 

@@ -19,7 +19,7 @@ use bevy::{
 };
 use bevy_vessels::{
     VesselPlugin,
-    plugin::{OrganVessels, SegmentChanges, VesselAppearance, VesselSystem, Vessels, VesselsOf},
+    plugin::{EntityCommandsExt, OrganVessels, SegmentChanges, VesselAppearance, VesselSystem, Vessels, VesselsOf},
     render::{SegmentBuffer, SegmentChunk, SegmentMaterial},
     synthesis::tree::{System, VesselTree},
 };
@@ -139,6 +139,7 @@ impl Stage {
         for prop in props {
             world.despawn(prop);
         }
+        world.get_mut::<Camera>(self.camera).expect("a camera").is_active = true;
         (self.name, self.pictures) = (name, 0);
         self.set_shadows(true);
         // dropped handles free their assets a frame later
@@ -162,6 +163,17 @@ impl Stage {
         let organ = world.spawn((Prop, Transform::default(), Visibility::default(), look)).id();
         let vessels = Vessels::from_tree(tree, birth_steps);
         world.spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(system), vessels));
+        organ
+    }
+
+    /// An organ of a mesh, with all its vessels grown.
+    pub fn spawn_organ(&mut self, mesh: Mesh, color: Color, components: impl Bundle) -> Entity {
+        let world = self.app.world_mut();
+        let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh);
+        let material = world.resource_mut::<Assets<StandardMaterial>>().add(color);
+        let organ = world.spawn((Prop, Mesh3d(mesh), MeshMaterial3d(material), components)).id();
+        world.commands().entity(organ).grow_now();
+        world.flush();
         organ
     }
 
@@ -211,6 +223,12 @@ impl Stage {
         self.app.world_mut().entity_mut(organ).insert(transform);
     }
 
+    /// Lets another camera draw, to an image of its own, and this one rest until the test ends.
+    pub fn use_camera(&mut self, camera: impl Bundle) -> Entity {
+        self.app.world_mut().get_mut::<Camera>(self.camera).expect("a camera").is_active = false;
+        self.app.world_mut().spawn((Prop, camera)).id()
+    }
+
     /// Draws for a while with further components on the camera.
     pub fn with_on_camera<B: Bundle>(&mut self, components: B, draw: impl FnOnce(&mut Self)) {
         self.app.world_mut().entity_mut(self.camera).insert(components);
@@ -243,6 +261,12 @@ impl Stage {
 
     /// What the camera sees now.
     pub fn picture(&mut self) -> Picture {
+        let target = self.app.world().resource::<OffscreenTarget>().0.clone();
+        Picture(self.picture_of(target))
+    }
+
+    /// What is drawn to an image now.
+    pub fn picture_of(&mut self, target: Handle<Image>) -> Image {
         // one frame queues shaders that weren't needed before; their files load in the background
         self.app.update();
         for _ in 0..200 {
@@ -252,7 +276,6 @@ impl Stage {
             self.app.update();
         }
         assert!(self.app.world().resource::<PipelinesReady>().0, "shaders don't load");
-        let target = self.app.world().resource::<OffscreenTarget>().0.clone();
         self.app.world_mut().spawn(Screenshot::image(target)).observe(
             |captured: On<ScreenshotCaptured>, mut taken: ResMut<Taken>| taken.0 = Some(captured.image.clone()),
         );
@@ -260,7 +283,7 @@ impl Stage {
             self.app.update();
             if let Some(image) = self.app.world_mut().resource_mut::<Taken>().0.take() {
                 self.keep(&image);
-                return Picture(image);
+                return image;
             }
         }
         panic!("no picture after 200 frames");
