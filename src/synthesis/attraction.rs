@@ -287,12 +287,34 @@ impl Drains {
         }
     }
 
+    /// Puts a drain first in the list of those that wait at a node.
     fn attach(&mut self, slot: u32, node: u32, distance: f32, cos: f32) {
-        attach(&mut self.hearing, &mut self.waiting, slot, node, distance, cos);
+        let Self { hearing, waiting, .. } = self;
+        if node as usize >= waiting.len() {
+            waiting.resize(node as usize + 1, NONE);
+        }
+        let after = std::mem::replace(&mut waiting[node as usize], slot);
+        if after != NONE {
+            hearing[after as usize].before = slot;
+        }
+        let own = &mut hearing[slot as usize];
+        *own = Hearing { node, distance, cos, before: NONE, after, closest: own.closest };
     }
 
+    /// Takes a drain out of the list that it is in, if any.
     fn detach(&mut self, slot: u32) {
-        detach(&mut self.hearing, &mut self.waiting, slot);
+        let Hearing { node, before, after, .. } = self.hearing[slot as usize];
+        if node == NONE {
+            return;
+        }
+        match before {
+            NONE => self.waiting[node as usize] = after,
+            before => self.hearing[before as usize].after = after,
+        }
+        if after != NONE {
+            self.hearing[after as usize].before = before;
+        }
+        self.hearing[slot as usize].node = NONE;
     }
 }
 
@@ -302,33 +324,4 @@ pub(crate) const ON_THE_NODE: f32 = 2.0;
 /// Cosine of the angle between a direction and the way from a node to a drain.
 pub(crate) fn cos_at(direction: Vec3, node: Vec3, drain: Vec3) -> f32 {
     (drain - node).try_normalize().map_or(ON_THE_NODE, |toward| direction.dot(toward).clamp(-1.0, 1.0))
-}
-
-/// Puts a drain first in the list of those that wait at a node.
-fn attach(hearing: &mut [Hearing], waiting: &mut Vec<u32>, slot: u32, node: u32, distance: f32, cos: f32) {
-    if node as usize >= waiting.len() {
-        waiting.resize(node as usize + 1, NONE);
-    }
-    let after = std::mem::replace(&mut waiting[node as usize], slot);
-    if after != NONE {
-        hearing[after as usize].before = slot;
-    }
-    let own = &mut hearing[slot as usize];
-    *own = Hearing { node, distance, cos, before: NONE, after, closest: own.closest };
-}
-
-/// Takes a drain out of the list that it is in, if any.
-fn detach(hearing: &mut [Hearing], waiting: &mut [u32], slot: u32) {
-    let Hearing { node, before, after, .. } = hearing[slot as usize];
-    if node == NONE {
-        return;
-    }
-    match before {
-        NONE => waiting[node as usize] = after,
-        before => hearing[before as usize].after = after,
-    }
-    if after != NONE {
-        hearing[after as usize].before = before;
-    }
-    hearing[slot as usize].node = NONE;
 }

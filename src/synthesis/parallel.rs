@@ -1,14 +1,13 @@
 //! Work on many items, on all threads where that pays, with the same result on any number of them.
 
 /// Fewest items worth handing to another thread, where each takes some tenths of a microsecond.
-#[cfg(feature = "parallel")]
 const WORTH_SHARING: usize = 256;
 
-/// How many of so many items one thread takes at a time; `None` where they are not worth sharing.
+/// How many of so many items one thread takes at a time, at least `least`; `None` where they are not worth sharing.
 #[cfg(feature = "parallel")]
-fn share_of(items: usize) -> Option<usize> {
+fn share_of(items: usize, least: usize) -> Option<usize> {
     let threads = rayon::current_num_threads();
-    (threads > 1 && items >= 2 * WORTH_SHARING).then(|| items.div_ceil(4 * threads).max(WORTH_SHARING))
+    (threads > 1 && items >= 2 * least).then(|| items.div_ceil(4 * threads).max(least))
 }
 
 /// Does the same to every item, which is also told its index. Each item is worth a thread of its own.
@@ -63,28 +62,40 @@ where
 {
     outputs.clear();
     outputs.resize(inputs.len(), blank);
-    #[cfg(feature = "parallel")]
-    if let Some(share) = share_of(inputs.len()) {
-        use rayon::prelude::*;
-        outputs.par_chunks_mut(share).zip(inputs.par_chunks(share)).for_each(|(outputs, inputs)| {
-            for (output, input) in outputs.iter_mut().zip(inputs) {
-                *output = map(input);
-            }
-        });
-        return;
-    }
-    for (output, input) in outputs.iter_mut().zip(inputs) {
-        *output = map(input);
-    }
+    map_all(inputs, outputs, WORTH_SHARING, |_, input| map(input));
+}
+
+/// Fills `outputs` with `map` of each index and input. Fewer than twice `least` of them are not worth sharing.
+pub(crate) fn map_all<I, O>(inputs: &[I], outputs: &mut [O], least: usize, map: impl Fn(usize, &I) -> O + Sync)
+where
+    I: Sync,
+    O: Send,
+{
+    zip_shares(inputs, outputs, least, |first, inputs, outputs| {
+        for (index, (output, input)) in (first..).zip(outputs.iter_mut().zip(inputs)) {
+            *output = map(index, input);
+        }
+    });
 }
 
 /// Lets `act` fill what belongs to each of the inputs, chunk by chunk.
 pub(crate) fn zip_chunks<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], act: impl Fn(&[I], &mut [O]) + Sync) {
+    zip_shares(inputs, outputs, WORTH_SHARING, |_, inputs, outputs| act(inputs, outputs));
+}
+
+/// As [`zip_chunks`]; `act` is also told the index of a chunk's first item.
+#[cfg_attr(not(feature = "parallel"), expect(unused_variables, reason = "one thread has nobody to share with"))]
+fn zip_shares<I, O>(inputs: &[I], outputs: &mut [O], least: usize, act: impl Fn(usize, &[I], &mut [O]) + Sync)
+where
+    I: Sync,
+    O: Send,
+{
     #[cfg(feature = "parallel")]
-    if let Some(share) = share_of(inputs.len()) {
+    if let Some(share) = share_of(inputs.len(), least) {
         use rayon::prelude::*;
-        inputs.par_chunks(share).zip(outputs.par_chunks_mut(share)).for_each(|(inputs, outputs)| act(inputs, outputs));
+        let shares = inputs.par_chunks(share).zip(outputs.par_chunks_mut(share)).enumerate();
+        shares.for_each(|(number, (inputs, outputs))| act(number * share, inputs, outputs));
         return;
     }
-    act(inputs, outputs);
+    act(0, inputs, outputs);
 }

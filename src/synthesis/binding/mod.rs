@@ -26,7 +26,6 @@ use surface::SurfaceBonds;
 use tetrahedra::SolidBonds;
 
 /// Fewest triangles, or fours of nodes, worth handing to another thread.
-#[cfg(feature = "parallel")]
 const WORTH_SHARING: usize = 2048;
 
 /// Why nodes could not follow. Nothing has been moved then.
@@ -176,21 +175,4 @@ impl Binding {
             Bonds::Solid(_) => Vec3::ZERO,
         }
     }
-}
-
-/// Fills `outputs` with `map` of each index and input, on all threads where that pays.
-fn map_all<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], map: impl Fn(usize, &I) -> O + Sync) {
-    let fill = |first: usize, outputs: &mut [O], inputs: &[I]| {
-        for (index, (output, input)) in (first..).zip(outputs.iter_mut().zip(inputs)) {
-            *output = map(index, input);
-        }
-    };
-    #[cfg(feature = "parallel")]
-    if inputs.len() >= 2 * WORTH_SHARING && rayon::current_num_threads() > 1 {
-        use rayon::prelude::*;
-        let shares = outputs.par_chunks_mut(WORTH_SHARING).zip(inputs.par_chunks(WORTH_SHARING)).enumerate();
-        shares.for_each(|(share, (outputs, inputs))| fill(share * WORTH_SHARING, outputs, inputs));
-        return;
-    }
-    fill(0, outputs, inputs);
 }

@@ -1,12 +1,13 @@
 //! Nodes bound to triangles.
 
 use super::{
+    WORTH_SHARING,
     frames::{Frames, LANES, Vectors},
-    map_all,
     vertices::{Vertex, Vertices},
 };
 use crate::synthesis::{
     mesh::{TriangleMesh, doubled_normal, unit},
+    parallel,
     tissue::TriangleIndex,
 };
 use bevy_math::{Vec3, Vec3A, Vec4};
@@ -137,7 +138,7 @@ impl SurfaceBonds {
         let vertices = &self.vertices;
         let (bonds, rest) = self.bonds.as_chunks::<LANES>();
         let (fours, others) = moved.as_chunks_mut::<LANES>();
-        map_all(bonds, fours, |_, bonds| nodes(bonds, vertices, scale));
+        parallel::map_all(bonds, fours, WORTH_SHARING, |_, bonds| nodes(bonds, vertices, scale));
         if let Some(&last) = rest.last() {
             let bonds = std::array::from_fn(|lane| *rest.get(lane).unwrap_or(&last));
             others.copy_from_slice(&nodes(&bonds, vertices, scale)[..others.len()]);

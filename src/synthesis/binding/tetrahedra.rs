@@ -1,8 +1,9 @@
 //! Nodes bound to tetrahedra, and the mesh of those.
 
-use super::map_all;
+use super::WORTH_SHARING;
 use crate::synthesis::{
     mesh::{MAX_COORDINATE, MAX_TRIANGLES, is_usable},
+    parallel,
     tissue::{
         bvh::{Bounds, BoxTree},
         triangle::closest_on_triangle,
@@ -202,7 +203,7 @@ impl SolidBonds {
     }
 
     pub fn follow(&self, vertices: &[Vec3], positions: &mut [Vec3]) {
-        map_all(&self.bonds, positions, |_, bond| {
+        parallel::map_all(&self.bonds, positions, WORTH_SHARING, |_, bond| {
             let [a, b, c, d] = bond.corners.map(|corner| vertices[corner as usize]);
             a + (b - a) * bond.weights.x + (c - a) * bond.weights.y + (d - a) * bond.weights.z
         });

@@ -4,8 +4,9 @@
 //! triangles around a position, weighted by area, as in [`TriangleMesh::vertex_normals`]; here in f32 and gathered
 //! vertex by vertex, so that threads share the work and nothing depends on their number.
 
-use super::map_all;
+use super::WORTH_SHARING;
 use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
+use crate::synthesis::parallel;
 use bevy_math::{Vec3, Vec3A};
 
 /// A vertex of a deformed organ. Position and normal lie side by side: a node asks for both, anywhere in the mesh.
@@ -67,17 +68,17 @@ impl Vertices {
             let [a, b, c] = corners.map(|corner| Vec3A::from(positions[corner as usize]) * scale);
             (b - a).cross(c - a)
         };
-        map_all(&self.triangles, &mut self.areas, area);
+        parallel::map_all(&self.triangles, &mut self.areas, WORTH_SHARING, area);
         let (around, areas) = (&self.around, &self.areas);
         let normal = |_, &[from, to]: &[u32; 2]| {
             let areas = around[from as usize..to as usize].iter().map(|&triangle| areas[triangle as usize]);
             // In f64, where no square of an area vanishes.
             Vec3A::from(unit(areas.sum::<Vec3A>().as_dvec3()))
         };
-        map_all(&self.ranges, &mut self.normals, normal);
+        parallel::map_all(&self.ranges, &mut self.normals, WORTH_SHARING, normal);
         let (welding, normals) = (&self.welding, &self.normals);
         vertices.resize(positions.len(), Vertex::default());
-        map_all(positions, vertices, |vertex, &position| Vertex {
+        parallel::map_all(positions, vertices, WORTH_SHARING, |vertex, &position| Vertex {
             position: position.into(),
             normal: normals[welding.vertex(vertex as u32)],
         });
