@@ -5,7 +5,7 @@ use super::{
     detail::{ChunkMeshes, FEWEST_SLOTS},
     material::{SegmentExtension, SegmentMaterial, VesselMaterials},
     stumps::Stumps,
-    upload::SegmentWrites,
+    upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
     plugin::{
@@ -322,7 +322,7 @@ impl SegmentStore<'_, '_> {
         }
         let (tree, births) = (vessels.tree(), vessels.birth_steps());
         let left_behind = len..segments.written.max(len);
-        let mut write = self.writes.begin(segments.buffer.clone(), changes.count(len) + left_behind.len());
+        let mut write = SegmentWrite::with_room(segments.buffer.clone(), changes.count(len) + left_behind.len());
         for (chunk, contents) in segments.contents.iter_mut().enumerate() {
             let nodes = changes.dirty_nodes(chunk * slots..((chunk + 1) * slots).min(len));
             let segment = |node| {

@@ -39,7 +39,12 @@ impl SegmentWrite {
     const MOST_SCATTERED: usize = 1 << 20;
 
     pub(super) fn new(buffer: Handle<ShaderBuffer>) -> Self {
-        Self { buffer, slots: Vec::new(), segments: Vec::new() }
+        Self::with_room(buffer, 0)
+    }
+
+    /// A write with room for so many segments.
+    pub(super) fn with_room(buffer: Handle<ShaderBuffer>, len: usize) -> Self {
+        Self { buffer, slots: Vec::with_capacity(len), segments: Vec::with_capacity(len) }
     }
 
     /// Number of segments.
@@ -84,51 +89,22 @@ impl SegmentWrite {
 #[derive(Resource, Debug, Default)]
 pub(super) struct SegmentWrites {
     queued: Vec<SegmentWrite>,
-    /// Memory of writes that are done. A large tree changes in each frame by some megabytes, which would have to be got
-    /// from the system each time.
-    spare: Vec<SegmentWrite>,
 }
 
 impl SegmentWrites {
-    /// Segments that spare memory has room for at most: 14 MB. What is written at once, now and then, isn't kept.
-    const MOST_SPARE: usize = 1 << 18;
-
-    /// A write with room for so many segments.
-    pub(super) fn begin(&mut self, buffer: Handle<ShaderBuffer>, len: usize) -> SegmentWrite {
-        let mut write = self.spare.pop().unwrap_or_else(|| SegmentWrite::new(Handle::default()));
-        write.buffer = buffer;
-        write.slots.reserve_exact(len);
-        write.segments.reserve_exact(len);
-        write
-    }
-
     /// Queues a write, unless there is nothing in it.
     pub(super) fn push(&mut self, write: SegmentWrite) {
         if write.len() > 0 {
             self.queued.push(write);
         }
     }
-
-    /// Keeps the memory of a write that is done.
-    fn recycle(&mut self, mut write: SegmentWrite) {
-        let kept: usize = self.spare.iter().map(|spare| spare.segments.capacity()).sum();
-        if kept + write.segments.capacity() <= Self::MOST_SPARE {
-            write.buffer = Handle::default();
-            write.slots.clear();
-            write.segments.clear();
-            self.spare.push(write);
-        }
-    }
 }
 
-/// Moves queued writes to the render world, and memory back.
+/// Moves queued writes to the render world.
 pub(super) fn extract_writes(mut main: ResMut<MainWorld>, mut writes: ResMut<SegmentWrites>) {
     let mut main = main.resource_mut::<SegmentWrites>();
     if !main.queued.is_empty() {
         writes.queued.append(&mut main.queued);
-    }
-    if !writes.spare.is_empty() {
-        main.spare = std::mem::take(&mut writes.spare);
     }
 }
 
@@ -191,9 +167,7 @@ pub(super) fn write_segments_to_gpu(
             }
             _ => false,
         };
-        if written {
-            writes.recycle(write);
-        } else {
+        if !written {
             waiting.push(write.buffer.id());
             writes.queued.push(write);
         }
