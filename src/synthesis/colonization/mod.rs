@@ -15,6 +15,7 @@ mod forest;
 mod lengths;
 mod perception;
 pub mod settings;
+mod step;
 mod system_growth;
 #[cfg(test)]
 mod tests;
@@ -25,12 +26,13 @@ pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWar
 use crate::synthesis::haemodynamics::BedLink;
 use crate::synthesis::parallel;
 use crate::synthesis::roots::{RootError, Roots};
-use crate::synthesis::tissue::{Extent, Tissue, TissuePoint};
+use crate::synthesis::tissue::{Tissue, TissuePoint};
 use crate::synthesis::tree::{NodeId, System, VesselTree};
 use bevy_math::Vec3;
-use candidates::Candidates;
+use candidates::{Candidates, Draws};
 use std::sync::Arc;
-use system_growth::{Ground, Supplied, SystemGrowth};
+use step::Step;
+use system_growth::{Supplied, SystemGrowth};
 use vacancy::Vacancy;
 
 /// What one step did.
@@ -92,6 +94,7 @@ pub struct Growth {
     step: u32,
     /// Steps in a row, up to the last one, that brought nothing.
     idle: u32,
+    draws: Draws,
     candidates: Candidates,
     vacancy: Vacancy,
     /// Drains on their way from the arteries to the veins.
@@ -114,14 +117,14 @@ impl Growth {
         let placed = Self::placed(tissue.as_ref(), &settings, roots, seed)?;
         let bounds = tissue.bounds();
         let systems = System::ALL.map(|system| SystemGrowth::new(settings.system(system), &bounds));
-        let candidates = Candidates::new(seed);
         let mut growth = Self {
             tissue,
             settings,
             systems,
             step: 0,
             idle: 0,
-            candidates,
+            draws: Draws::new(seed),
+            candidates: Candidates::default(),
             vacancy: Vacancy::default(),
             handed: Vec::new(),
             links: Vec::new(),
@@ -143,7 +146,7 @@ impl Growth {
             self.systems[system.index()].restart(settings.system(system), &bounds);
         }
         self.settings = settings;
-        self.candidates.restart(seed);
+        self.draws.restart(seed);
         (self.step, self.idle) = (0, 0);
         self.links.clear();
         self.reset_vacancy();
@@ -170,9 +173,9 @@ impl Growth {
     }
 
     fn plant(&mut self, placed: &[Vec<TissuePoint>; 2], roots: &Roots) {
-        let ground = ground(self.tissue.as_ref(), &self.settings, 1);
+        let step = Step { tissue: self.tissue.as_ref(), settings: &self.settings, number: 1 };
         for (index, system) in self.systems.iter_mut().enumerate() {
-            system.plant(&placed[index], roots.given[index].as_ref(), ground);
+            system.plant(&placed[index], roots.given[index].as_ref(), step.ground());
         }
     }
 
@@ -190,13 +193,14 @@ impl Growth {
             return StepReport { step: self.step, ..StepReport::default() };
         }
         self.step += 1;
-        let (tissue, settings, step) = (self.tissue.as_ref(), &self.settings, self.step);
+        let step = Step { tissue: self.tissue.as_ref(), settings: &self.settings, number: self.step };
         let [arteries, veins] = &mut self.systems;
-        let (born, arterial) = grow_arteries(arteries, &mut self.candidates, &mut self.vacancy, tissue, settings, step);
-        let venous = grow_veins(veins, arteries.supplied(), &mut self.links, tissue, settings, step);
+        step.choose_candidates(&mut self.draws, &mut self.candidates, &mut self.vacancy, arteries);
+        let (born, arterial) = step.grow_arteries(arteries, &self.candidates, &mut self.vacancy);
+        let venous = step.grow_veins(veins, arteries.supplied(), &mut self.links);
         let acted = born > 0 || arterial.new_nodes > 0 || venous.new_nodes > 0;
-        self.idle = idle_after(self.idle, acted, tissue, settings, step);
-        StepReport { step, sampled: settings.samples, born, systems: [arterial, venous] }
+        self.idle = step.idle_after(self.idle, acted);
+        StepReport { step: step.number, sampled: self.settings.samples, born, systems: [arterial, venous] }
     }
 
     /// Renews by Murray's law all radii that the steps since the last settling changed.
@@ -210,37 +214,48 @@ impl Growth {
     /// take the next one, on another thread if there is one.
     pub fn run(&mut self) {
         let (tissue, settings) = (self.tissue.as_ref(), &self.settings);
-        let (candidates, vacancy) = (&mut self.candidates, &mut self.vacancy);
+        let at = |number: u32| Step { tissue, settings, number };
+        let (draws, candidates, vacancy) = (&mut self.draws, &mut self.candidates, &mut self.vacancy);
         let ([arteries, veins], handed, links) = (&mut self.systems, &mut self.handed, &mut self.links);
-        let (step, idle) = (&mut self.step, &mut self.idle);
+        let (done, idle) = (&mut self.step, &mut self.idle);
         parallel::with_company(|| {
             // The step that the veins have not taken yet, and whether the arteries did something in it.
             let (mut waiting, mut acted) = (None, true);
             let mut grow_veins = |handed: &[Supplied], waiting: Option<u32>| {
-                waiting.is_some_and(|step| grow_veins(veins, handed, links, tissue, settings, step).new_nodes > 0)
+                waiting.is_some_and(|number| at(number).grow_veins(veins, handed, links).new_nodes > 0)
             };
-            while !is_over(*step, *idle, settings) {
+            while !is_over(*done, *idle, settings) {
                 if !acted {
                     // It depends on the veins whether there is a next step.
                     let grown = grow_veins(handed, waiting.take());
-                    *idle = idle_after(*idle, grown, tissue, settings, *step);
+                    *idle = at(*done).idle_after(*idle, grown);
                     acted = true;
                     continue;
                 }
-                let next = *step + 1;
-                let grow = || grow_arteries(arteries, candidates, vacancy, tissue, settings, next);
-                let ((born, report), _) = parallel::join(grow, || grow_veins(handed, waiting));
+                let step = at(*done + 1);
+                // All threads look at candidates, since the rest of the arteries' step has little to share.
+                step.choose_candidates(draws, candidates, vacancy, arteries);
+                // The next ones are drawn ahead, unless it matters what this step comes to.
+                let ahead = vacancy.chosen().is_none() && step.number < settings.steps;
+                let beside = || {
+                    grow_veins(handed, waiting);
+                    if ahead {
+                        at(step.number + 1).draw(draws, None);
+                    }
+                };
+                let grow = || step.grow_arteries(arteries, candidates, vacancy);
+                let ((born, report), ()) = parallel::join(grow, beside);
                 acted = born > 0 || report.new_nodes > 0;
                 if acted {
                     *idle = 0;
                 }
                 handed.clear();
                 handed.extend_from_slice(arteries.supplied());
-                (*step, waiting) = (next, Some(next));
+                (*done, waiting) = (step.number, Some(step.number));
             }
             let grown = grow_veins(handed, waiting);
             if !acted {
-                *idle = idle_after(*idle, grown, tissue, settings, *step);
+                *idle = at(*done).idle_after(*idle, grown);
             }
         });
         self.settle();
@@ -336,67 +351,4 @@ impl Growth {
 
 fn is_over(step: u32, idle: u32, settings: &ColonizationSettings) -> bool {
     step >= settings.steps || (settings.idle_steps > 0 && idle >= settings.idle_steps)
-}
-
-/// Number of steps in a row that brought nothing, given the one before a step and whether the step brought something. Steps
-/// do not count as long as tissue that grows or changes may need more vessels.
-fn idle_after(idle: u32, acted: bool, tissue: &dyn Tissue, settings: &ColonizationSettings, step: u32) -> u32 {
-    let settled = System::ALL.iter().all(|&system| settings.system(system).tissue_growth.is_over(step));
-    if acted || !settled || tissue.stage(step).is_some() { 0 } else { idle + 1 }
-}
-
-/// Draws candidates, lets those in unsupplied tissue become drains, and grows the arteries towards them. The number of
-/// drains born comes back.
-fn grow_arteries(
-    arteries: &mut SystemGrowth,
-    candidates: &mut Candidates,
-    vacancy: &mut Vacancy,
-    tissue: &dyn Tissue,
-    settings: &ColonizationSettings,
-    step: u32,
-) -> (u32, SystemReport) {
-    let ground = ground(tissue, settings, step);
-    // A staged tissue is another one from stage to stage, and has no pieces of its own.
-    if tissue.stage(1).is_none() {
-        vacancy.prepare(tissue, arteries.length_scale(), arteries.forest.tree.positions(), arteries.drains.living());
-    }
-    candidates.draw(ground.tissue, vacancy, step, settings.samples, |candidates, refused| {
-        arteries.refuse(candidates, refused);
-    });
-    let mut born = 0;
-    for candidate in candidates.iter() {
-        if let Some(drain) = arteries.offer_drain(candidate) {
-            vacancy.add_drain(drain, candidate);
-            born += 1;
-        }
-    }
-    let report = arteries.grow(ground, step);
-    arteries.supplied().iter().for_each(|supplied| vacancy.remove_drain(supplied.drain, supplied.position));
-    arteries.advance_tissue(step);
-    (born, report)
-}
-
-/// Hands over the drains that the arteries `supplied` in this step, and grows the veins towards them.
-fn grow_veins(
-    veins: &mut SystemGrowth,
-    supplied: &[Supplied],
-    links: &mut Vec<BedLink>,
-    tissue: &dyn Tissue,
-    settings: &ColonizationSettings,
-    step: u32,
-) -> SystemReport {
-    let mut report = SystemReport::default();
-    if !veins.forest.tree.is_empty() {
-        veins.receive(supplied);
-        report = veins.grow(ground(tissue, settings, step), step);
-        links.extend(veins.links());
-    }
-    veins.advance_tissue(step);
-    report
-}
-
-fn ground<'a>(tissue: &'a dyn Tissue, settings: &ColonizationSettings, step: u32) -> Ground<'a> {
-    let tissue = tissue.at_step(step);
-    let surface = matches!(tissue.extent(), Extent::Area(_));
-    Ground { tissue, confine: settings.confine, normals: settings.stand_off && surface }
 }

@@ -111,6 +111,11 @@ impl Vacancy {
         }
     }
 
+    /// This, where there is something to choose: pieces of the tissue.
+    pub fn chosen(&self) -> Option<&Self> {
+        (!self.pieces.is_empty()).then_some(self)
+    }
+
     fn cut(&mut self, tissue: &dyn Tissue, scale: f32) {
         (self.cut_at, self.until) = (scale, scale);
         self.pieces.clear();
@@ -192,11 +197,8 @@ impl Vacancy {
     }
 
     /// Draws as many candidates as of `count` samples fall on listed pieces, less those on pieces that are blocked by now.
-    /// `false`, and nothing drawn, for a tissue that cannot be cut.
-    pub fn draw(&self, tissue: &dyn Tissue, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) -> bool {
-        if self.pieces.is_empty() {
-            return false;
-        }
+    /// There must be pieces.
+    pub fn draw(&self, tissue: &dyn Tissue, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
         let share = self.listed_measure / self.whole;
         let falling = if share < 1.0 { draws::count_below(rng, count, share) } else { count };
         let slots = self.listed.len() as u32;
@@ -209,7 +211,6 @@ impl Vacancy {
                 candidates.extend(tissue.point_of(self.reach, self.pieces[piece].id, numbers));
             }
         });
-        true
     }
 }
 
@@ -287,7 +288,8 @@ mod tests {
             assert!(vacancy.listed_measure < 0.9 * vacancy.whole, "case {case}: too little is blocked to tell");
 
             let (mut pieced, mut plain) = (Vec::new(), Vec::new());
-            assert!(vacancy.draw(tissue.as_ref(), &mut rng, SAMPLES, &mut pieced));
+            assert!(vacancy.chosen().is_some());
+            vacancy.draw(tissue.as_ref(), &mut rng, SAMPLES, &mut pieced);
             tissue.draw(&mut rng, SAMPLES, &mut plain);
             let all = plain.len();
             [&mut pieced, &mut plain].into_iter().for_each(|points| points.retain(|point| !refused(point)));

@@ -48,7 +48,7 @@ impl Bounds {
     }
 
     /// Squared distance to a point, 0 inside.
-    fn distance_squared(&self, point: Vec3A) -> f32 {
+    pub(super) fn distance_squared(&self, point: Vec3A) -> f32 {
         let outside = (self.min - point).max(point - self.max).max(Vec3A::ZERO);
         outside.length_squared()
     }

@@ -52,6 +52,10 @@ impl TriangleIndex {
             return None;
         }
         self.tree.nearest(point, radius * radius, |slot, best| {
+            // Most triangles of a leaf are farther off than the best one, and their boxes tell.
+            if Bounds::around(&self.corners[slot]).distance_squared(point.into()) > best {
+                return best;
+            }
             let (weights, position) = closest_on_triangle(point, self.corners[slot]);
             let distance_squared = (position - point.as_dvec3()).length_squared() as f32;
             let triangle = self.triangles[slot] as usize;

@@ -1,0 +1,91 @@
+//! The parts of a step, in their order: candidates, arteries, veins.
+
+use super::candidates::{Candidates, Draws};
+use super::system_growth::{Ground, Supplied, SystemGrowth};
+use super::vacancy::Vacancy;
+use super::{ColonizationSettings, SystemReport};
+use crate::synthesis::haemodynamics::BedLink;
+use crate::synthesis::tissue::{Extent, Tissue};
+use crate::synthesis::tree::System;
+
+/// A step, which may be taken part by part.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step<'a> {
+    pub tissue: &'a dyn Tissue,
+    pub settings: &'a ColonizationSettings,
+    /// Number of the step, from 1.
+    pub number: u32,
+}
+
+impl Step<'_> {
+    /// Draws candidates, and finds out which of them are in tissue that the arteries supply. Of tissue that is cut into
+    /// pieces they are drawn where it is `vacant`.
+    pub fn choose_candidates(
+        self,
+        draws: &mut Draws,
+        candidates: &mut Candidates,
+        vacancy: &mut Vacancy,
+        arteries: &SystemGrowth,
+    ) {
+        // A staged tissue is another one from stage to stage, and has no pieces of its own.
+        if self.tissue.stage(1).is_none() {
+            let (nodes, drains) = (arteries.forest.tree.positions(), arteries.drains.living());
+            vacancy.prepare(self.tissue, arteries.length_scale(), nodes, drains);
+        }
+        self.draw(draws, vacancy.chosen());
+        candidates.take(draws, &self.tissue.bounds(), |some, refused| arteries.refuse(some, refused));
+    }
+
+    /// Draws candidates, unless it has been done before.
+    pub fn draw(self, draws: &mut Draws, vacancy: Option<&Vacancy>) {
+        draws.draw(self.tissue.at_step(self.number), vacancy, self.number, self.settings.samples);
+    }
+
+    /// Lets candidates in unsupplied tissue become drains, and grows the arteries towards them. The number of drains born
+    /// comes back.
+    pub fn grow_arteries(
+        self,
+        arteries: &mut SystemGrowth,
+        candidates: &Candidates,
+        vacancy: &mut Vacancy,
+    ) -> (u32, SystemReport) {
+        let mut born = 0;
+        for candidate in candidates.iter() {
+            if let Some(drain) = arteries.offer_drain(candidate) {
+                vacancy.add_drain(drain, candidate);
+                born += 1;
+            }
+        }
+        let report = arteries.grow(self.ground(), self.number);
+        arteries.supplied().iter().for_each(|supplied| vacancy.remove_drain(supplied.drain, supplied.position));
+        arteries.advance_tissue(self.number);
+        (born, report)
+    }
+
+    /// Hands over the drains that the arteries `supplied` in this step, and grows the veins towards them.
+    pub fn grow_veins(self, veins: &mut SystemGrowth, supplied: &[Supplied], links: &mut Vec<BedLink>) -> SystemReport {
+        let mut report = SystemReport::default();
+        if !veins.forest.tree.is_empty() {
+            veins.receive(supplied);
+            report = veins.grow(self.ground(), self.number);
+            links.extend(veins.links());
+        }
+        veins.advance_tissue(self.number);
+        report
+    }
+
+    /// Where new nodes may be put.
+    pub fn ground(&self) -> Ground<'_> {
+        let tissue = self.tissue.at_step(self.number);
+        let surface = matches!(tissue.extent(), Extent::Area(_));
+        Ground { tissue, confine: self.settings.confine, normals: self.settings.stand_off && surface }
+    }
+
+    /// Number of steps in a row that brought nothing, given the one before this and whether this `acted`. Steps do not count
+    /// as long as tissue that grows or changes may need more vessels.
+    pub fn idle_after(self, idle: u32, acted: bool) -> u32 {
+        let is_over = |&system: &System| self.settings.system(system).tissue_growth.is_over(self.number);
+        let settled = System::ALL.iter().all(is_over);
+        if acted || !settled || self.tissue.stage(self.number).is_some() { 0 } else { idle + 1 }
+    }
+}
