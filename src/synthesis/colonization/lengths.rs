@@ -72,4 +72,4 @@ impl Lengths {
 }
 
 /// Side of a cell as a share of the distance that is asked for most.
-const CELL: f32 = 2.0;
+const CELL: f32 = 2.01;
