@@ -81,22 +81,26 @@ fn reference(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// From ten thousand nodes to a million. Nodes a second are what should stay.
+/// From ten thousand nodes to a million, with samples and lengths to match: 20 samples a node of the arteries. Nodes a second
+/// are what should stay.
 fn scale(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("scale");
     group.sample_size(10);
+    let ball = |samples: u32, lengths: f32| Case::ball().sized(samples, 300, lengths / 1.5);
     let mut cases = vec![
-        ("ball, 10k", Case::ball().sized(700, 90, 1.0)),
-        ("ball, 100k", Case::ball().sized(4000, 150, 1.1 / 1.5)),
-        ("ball, 1M", Case::ball().sized(22_000, 260, 0.8 / 1.5)),
+        ("ball, arteries, 10k", ball(640, 3.945).arteries_only()),
+        ("ball, arteries, 100k", ball(6400, 1.83).arteries_only()),
+        ("ball, 100k + 60k", ball(6400, 1.83)),
+        ("ball, arteries, 1M", ball(64_000, 0.85).arteries_only()),
+        ("ball, 1M + 0.6M", ball(64_000, 0.85)),
     ];
     let colon = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/organs/colon_vhf.glb");
     match read_mesh(&colon).map(MeshSurface::new) {
         Ok(Ok(colon)) => {
             let colon: Arc<dyn Tissue> = Arc::new(colon);
             let case = || Case::new(Arc::clone(&colon), PresetName::Colon);
-            cases.push(("colon, 50k", case()));
-            cases.push(("colon, 200k", case().sized(10_000, 240, 0.45)));
+            cases.push(("colon, 27k + 22k", case()));
+            cases.push(("colon, 116k + 98k", case().sized(8000, 300, 0.42)));
         }
         _ => println!("no real colon at {}; its cases are left out", colon.display()),
     }
