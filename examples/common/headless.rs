@@ -2,6 +2,7 @@
 
 use bevy::{
     app::{PluginGroupBuilder, ScheduleRunnerPlugin},
+    log::{DEFAULT_FILTER, LogPlugin},
     prelude::*,
     render::{
         ExtractSchedule, MainWorld, RenderApp, RenderPlugin,
@@ -39,11 +40,14 @@ pub fn find_adapter() -> Option<String> {
 /// With `draws` off there is no renderer either, and no adapter is needed.
 pub fn headless_plugins(draws: bool) -> PluginGroupBuilder {
     let settings = if draws { WgpuSettings::default() } else { WgpuSettings { backends: None, ..default() } };
+    // Where nothing is to be drawn, Bevy reports the want of a renderer as an error.
+    let silenced = if draws { "" } else { "bevy_render=off,bevy_gltf=error," };
     DefaultPlugins
         .build()
         .disable::<WinitPlugin>()
         // the picture of a frame is the picture of that frame, not of the one before
         .disable::<PipelinedRenderingPlugin>()
+        .set(LogPlugin { filter: format!("{silenced}{DEFAULT_FILTER}"), ..default() })
         .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
         .set(RenderPlugin {
             render_creation: settings.into(),

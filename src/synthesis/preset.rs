@@ -106,100 +106,71 @@ pub enum PresetError {
     Write(String),
 }
 
-/// The built-in presets.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
-pub enum PresetName {
-    /// The paper's defaults, with venous settings that never stall.
-    #[default]
-    Paper,
-    /// The paper's own program on its disc, defects included, as the reference figures were measured.
-    ReferenceDisc,
-    /// The same program in a ball.
-    ReferenceBall,
-    /// The paper's Fig. 5 with a larger exponent: wider angles, less difference in radius.
-    WideAngles,
-    /// The paper's Fig. 5 with a larger direction weight: straighter vessels.
-    Straight,
-    /// The paper's Fig. 5 with a smaller bifurcation threshold: more symmetric bifurcations.
-    Symmetric,
-    /// The paper's Fig. 5 with a larger bifurcation threshold: more lateral branches.
-    Lateral,
-    /// The wall of the large intestine.
-    Colon,
-    /// The liver, through its volume.
-    Liver,
-    /// The kidney, through its volume.
-    Kidney,
-    /// The white of the eye.
-    Conjunctiva,
-    /// The back of the eye.
-    Retina,
+/// The enum of the built-in presets, each with the name of its file.
+macro_rules! presets {
+    ($($(#[$doc:meta])* $preset:ident = $name:literal,)+) => {
+        /// The built-in presets.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+        pub enum PresetName {
+            $($(#[$doc])* $preset,)+
+        }
+
+        impl PresetName {
+            /// All built-in presets.
+            pub const ALL: [Self; Self::COUNT] = [$(Self::$preset),+];
+            /// Number of built-in presets.
+            pub const COUNT: usize = [$($name),+].len();
+
+            /// The name in files and on command lines, such as `reference-disc`.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$preset => $name,)+
+                }
+            }
+
+            /// The file's text.
+            #[cfg(feature = "serialize")]
+            pub fn ron(self) -> &'static str {
+                match self {
+                    $(Self::$preset => include_str!(concat!("../../assets/presets/", $name, ".ron")),)+
+                }
+            }
+        }
+    };
 }
 
+presets! {
+    /// The paper's defaults, with venous settings that never stall.
+    #[default]
+    Paper = "paper",
+    /// The paper's own program on its disc, defects included, as the reference figures were measured.
+    ReferenceDisc = "reference-disc",
+    /// The same program in a ball.
+    ReferenceBall = "reference-ball",
+    /// The paper's Fig. 5 with a larger exponent: wider angles, less difference in radius.
+    WideAngles = "wide-angles",
+    /// The paper's Fig. 5 with a larger direction weight: straighter vessels.
+    Straight = "straight",
+    /// The paper's Fig. 5 with a smaller bifurcation threshold: more symmetric bifurcations.
+    Symmetric = "symmetric",
+    /// The paper's Fig. 5 with a larger bifurcation threshold: more lateral branches.
+    Lateral = "lateral",
+    /// The wall of the large intestine.
+    Colon = "colon",
+    /// The liver, through its volume.
+    Liver = "liver",
+    /// The kidney, through its volume.
+    Kidney = "kidney",
+    /// The white of the eye.
+    Conjunctiva = "conjunctiva",
+    /// The back of the eye.
+    Retina = "retina",
+}
+
+#[cfg(feature = "serialize")]
 impl PresetName {
-    /// Number of built-in presets.
-    pub const COUNT: usize = 12;
-    /// All built-in presets.
-    pub const ALL: [Self; Self::COUNT] = [
-        Self::Paper,
-        Self::ReferenceDisc,
-        Self::ReferenceBall,
-        Self::WideAngles,
-        Self::Straight,
-        Self::Symmetric,
-        Self::Lateral,
-        Self::Colon,
-        Self::Liver,
-        Self::Kidney,
-        Self::Conjunctiva,
-        Self::Retina,
-    ];
-
-    /// The name in files and on command lines, such as `reference-disc`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::ReferenceDisc => "reference-disc",
-            Self::ReferenceBall => "reference-ball",
-            Self::WideAngles => "wide-angles",
-            Self::Straight => "straight",
-            Self::Symmetric => "symmetric",
-            Self::Lateral => "lateral",
-            Self::Colon => "colon",
-            Self::Liver => "liver",
-            Self::Kidney => "kidney",
-            Self::Conjunctiva => "conjunctiva",
-            Self::Retina => "retina",
-        }
-    }
-
-    /// The file's text.
-    #[cfg(feature = "serialize")]
-    pub fn ron(self) -> &'static str {
-        macro_rules! file {
-            ($name:literal) => {
-                include_str!(concat!("../../assets/presets/", $name, ".ron"))
-            };
-        }
-        match self {
-            Self::Paper => file!("paper"),
-            Self::ReferenceDisc => file!("reference-disc"),
-            Self::ReferenceBall => file!("reference-ball"),
-            Self::WideAngles => file!("wide-angles"),
-            Self::Straight => file!("straight"),
-            Self::Symmetric => file!("symmetric"),
-            Self::Lateral => file!("lateral"),
-            Self::Colon => file!("colon"),
-            Self::Liver => file!("liver"),
-            Self::Kidney => file!("kidney"),
-            Self::Conjunctiva => file!("conjunctiva"),
-            Self::Retina => file!("retina"),
-        }
-    }
-
     /// The preset.
-    #[cfg(feature = "serialize")]
     #[expect(clippy::expect_used, reason = "the text is compiled in, and a test loads every one")]
     pub fn load(self) -> Preset {
         Preset::from_ron(self.ron()).expect("built-in presets are valid")
