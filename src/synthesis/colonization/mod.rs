@@ -20,6 +20,7 @@ mod system_growth;
 #[cfg(test)]
 mod tests;
 mod vacancy;
+mod validity;
 
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
