@@ -58,6 +58,7 @@ impl Draws {
                 Some(vacancy) => vacancy.draw(tissue, &mut rng, count, block),
                 None => tissue.draw(&mut rng, count, block),
             }
+            block.retain(|candidate| candidate.is_finite());
         });
     }
 }
@@ -78,7 +79,7 @@ impl Candidates {
     /// Takes what has been drawn within a box, less those that `refuse` marks.
     pub fn take(&mut self, draws: &Draws, bounds: &Aabb3d, refuse: impl Fn(&[Vec3], &mut [bool]) + Sync) {
         self.drawn.clear();
-        self.drawn.extend(draws.blocks.iter().flatten().filter(|candidate| candidate.is_finite()));
+        draws.blocks.iter().for_each(|block| self.drawn.extend_from_slice(block));
         self.refused.clear();
         self.refused.resize(self.drawn.len(), false);
         if self.drawn.len() < WORTH_SORTING {
