@@ -96,6 +96,23 @@ fn the_number_of_threads_changes_nothing() {
     }
 }
 
+#[cfg(feature = "parallel")]
+#[test]
+fn growths_that_share_threads_change_nothing() {
+    use rayon::prelude::*;
+    for case in tissues().into_iter().take(2) {
+        let alone: Vec<u64> = (0..4).map(|seed| grown(&case, seed).0).collect();
+        for threads in [2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            // While one waits for its own work, its thread grows others.
+            let together: Vec<u64> =
+                pool.install(|| (0..40).into_par_iter().map(|seed| grown(&case, seed % 4).0).collect());
+            let expected = alone.iter().cycle().take(40);
+            assert!(together.iter().eq(expected), "{} on {threads} threads", case.name);
+        }
+    }
+}
+
 #[test]
 fn a_restart_leaves_no_trace_of_what_was() {
     for case in tissues() {
