@@ -55,7 +55,7 @@ pub fn cauterise(mut stroke: Stroke, touch: Vec3) -> Result<(), BladeError> {
 }
 
 /// Puts a clamp on the vessel at a point.
-pub fn clamp(vessels: &mut CuttableVessels, touch: Vec3) {
+fn clamp(vessels: &mut CuttableVessels, touch: Vec3) {
     vessels.clamp(touch, REACH);
 }
 

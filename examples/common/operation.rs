@@ -6,17 +6,18 @@ use crate::{
         studio::{StudioArgs, View},
     },
     figures::{Figures, Reading},
-    instruments::{cauterise, clamp, draw_scalpel},
+    instruments::{cauterise, draw_scalpel},
     surface::Surface,
 };
-use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy::{ecs::system::SystemParam, prelude::*, time::TimeUpdateStrategy};
 use bevy_vessels::{
-    plugin::{CirculationState, CuttableVessels, OrganSupply, StrokeId, VesselSystems},
+    plugin::{CirculationState, CuttableVessels, OpenEnd, OrganSupply, StrokeId, VesselSystems},
     prelude::*,
     synthesis::{
         io::write_atomically,
         organ::Viewpoint,
-        tree::{NodeId, System},
+        tree::{NodeId, Place, System, VesselTree},
+        wound::EndSide,
     },
 };
 use clap::ValueEnum;
@@ -25,7 +26,7 @@ use std::{io::Write, time::Duration};
 /// What is done where there is no window.
 #[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq)]
 pub enum Script {
-    /// A cut across the widest artery in view, a clamp above it, then cautery along the cut.
+    /// A cut across the widest artery in view, a clamp on what feeds the end that bleeds most, then cautery along the cut.
     #[default]
     Demo,
 }
@@ -37,13 +38,16 @@ const INTERVAL: f64 = 0.1;
 /// When the cut begins and ends, and how long it is in world units.
 const CUT: [f64; 2] = [0.3, 0.8];
 const CUT_LENGTH: f32 = 0.11;
-/// Least length of the segment that is cut, in radii.
-const SLENDER: f32 = 6.0;
-/// How far above the cut the clamp goes on, in world units.
+/// How far above the end that bleeds most the clamp goes on, in world units, and how far at least the root is from the cut.
 const CLAMP_ABOVE: f32 = 0.03;
+const ROOT_ABOVE: f32 = 0.06;
+/// Least cosine between the normal of the skin that is cut and the direction that it is seen from.
+const FACING: f32 = 0.5;
 const CLAMP: f64 = 5.0;
 const CAUTERY: f64 = 8.0;
 const END: f64 = 9.5;
+/// Over how many seconds before each step the bleeding is told: more than a beat of the heart.
+const TOLD_OVER: f64 = 1.0;
 /// When which picture is taken.
 const PICTURES: [(f64, &str); 4] =
     [(0.1, "cutting_before.png"), (0.875, "cutting_cut.png"), (4.9, "cutting.png"), (7.5, "cutting_clamped.png")];
@@ -83,30 +87,23 @@ struct Site {
     normal: Vec3,
     /// Across the vessel, along the skin.
     across: Vec3,
-    /// On the vessel, towards its root.
-    upstream: Vec3,
 }
 
 impl Site {
-    /// The widest slender artery in view, with some vessel between it and its root.
+    /// The widest artery in view, on skin that faces the viewer, with some vessel between it and its root.
     fn find(vessels: &Vessels, place: &GlobalTransform, surface: &Surface) -> Option<Self> {
         let tree = vessels.tree();
         let at = |node: NodeId| place.transform_point(tree.positions()[node.index()]);
         let is_seen = |node: NodeId| surface.hit(surface.eye, at(node).lerp(surface.eye, 0.01)).is_none();
-        let above = |node: NodeId, far: f32| {
-            let mut path = std::iter::successors(Some(node), |&node| tree.parent(node));
-            path.find(|&other| at(other).distance(at(node)) > far)
-        };
-        // an end stays on its segment: in a stout one, the joints' round ends would hide the gap
-        let is_slender = |node: usize| tree.segment_vector(node).length() > SLENDER * tree.radii()[node];
-        let slender = tree.segments().filter(|&(node, _)| is_slender(node));
-        let mut nodes: Vec<NodeId> = slender.map(|(node, _)| NodeId(node as u32)).collect();
+        let mut nodes: Vec<NodeId> = tree.segments().map(|(node, _)| NodeId(node as u32)).collect();
         nodes.sort_by(|a, b| tree.radii()[b.index()].total_cmp(&tree.radii()[a.index()]));
-        let node = nodes.into_iter().find(|&node| above(node, 2.0 * CLAMP_ABOVE).is_some() && is_seen(node))?;
-        let (wound, normal) = surface.nearest(at(node))?;
+        let is_far = |node: NodeId| above(tree, node, |other| at(other).distance(at(node)) > ROOT_ABOVE).is_some();
+        let faces = |[at, normal]: &[Vec3; 2]| (surface.eye - at).normalize_or_zero().dot(*normal) > FACING;
+        let site = |node: NodeId| surface.nearest(at(node)).map(Into::into).filter(faces);
+        let seen = nodes.into_iter().filter(|&node| is_far(node) && is_seen(node));
+        let (node, [wound, normal]) = seen.filter_map(|node| Some((node, site(node)?))).next()?;
         let along = at(node) - at(tree.parent(node)?);
-        let upstream = at(above(node, CLAMP_ABOVE)?);
-        Some(Self { wound, normal, across: along.cross(normal).normalize_or(Vec3::X), upstream })
+        Some(Self { wound, normal, across: along.cross(normal).normalize_or(Vec3::X) })
     }
 
     /// Where the scalpel is at a share of its way, and in which direction its edge points.
@@ -123,6 +120,42 @@ impl Site {
     }
 }
 
+/// The first node on the way to the root, from a node on, that passes a test.
+fn above(tree: &VesselTree, node: NodeId, passes: impl Fn(NodeId) -> bool) -> Option<NodeId> {
+    std::iter::successors(Some(node), |&node| tree.parent(node)).find(|&node| passes(node))
+}
+
+/// The patient's open ends and vessels.
+#[derive(SystemParam)]
+struct Patient<'w, 's> {
+    ends: Query<'w, 's, (&'static OpenEnd, &'static GlobalTransform)>,
+    vessels: Query<'w, 's, (&'static VesselSystem, &'static Vessels, &'static GlobalTransform)>,
+    blood: Query<'w, 's, (&'static CirculationState, &'static OrganSupply)>,
+}
+
+impl Patient<'_, '_> {
+    /// Where to operate.
+    fn site(&self, surface: &Surface) -> Option<Site> {
+        let arteries = self.vessels.iter().filter(|(system, ..)| system.0 == System::Arterial);
+        arteries.filter_map(|(_, vessels, place)| Site::find(vessels, place, surface)).next()
+    }
+
+    /// Where the artery that has lost most is to be clamped: on the way from its root to its end, a little before that.
+    fn feeds_most(&self) -> Option<(Entity, Place)> {
+        let fed = self.ends.iter().filter(|(end, _)| (end.system, end.side) == (System::Arterial, EndSide::Proximal));
+        let (end, tip) = fed.max_by(|(a, _), (b, _)| a.lost.ml().total_cmp(&b.lost.ml()))?;
+        let (_, vessels, to_world) = self.vessels.get(end.vessels).ok()?;
+        let tree = vessels.tree();
+        let is_above = |node: NodeId| {
+            let at = to_world.transform_point(tree.positions()[node.index()]);
+            // the segment below a root is the last that can be clamped
+            let is_last = tree.parent(node).is_none_or(|parent| tree.parent(parent).is_none());
+            is_last || at.distance(tip.translation()) > CLAMP_ABOVE
+        };
+        Some((end.vessels, Place::new(above(tree, end.place.node, is_above)?, 0.5)))
+    }
+}
+
 /// Goes on by a frame, unless a picture is being taken.
 fn operate(
     time: Res<Time>,
@@ -131,21 +164,20 @@ fn operate(
     (mut shots, mut more): (ResMut<Shots>, ResMut<MoreShots>),
     mut vessels: ResMut<CuttableVessels>,
     mut looks: Query<&mut VesselAppearance>,
-    patient: (Query<(&CirculationState, &OrganSupply)>, Query<(&VesselSystem, &Vessels, &GlobalTransform)>),
+    patient: Patient,
     surface: Option<Res<Surface>>,
     mut exit: MessageWriter<AppExit>,
 ) -> Result {
     *step = TimeUpdateStrategy::ManualDuration(Duration::ZERO);
     let Some(surface) = surface else { return Ok(()) };
     let Some(site) = operation.site else {
-        if let Some(error) = patient.0.iter().find_map(|(state, _)| state.error()) {
+        if let Some(error) = patient.blood.iter().find_map(|(state, _)| state.error()) {
             eprintln!("{error}");
             exit.write(AppExit::error());
         }
         // the blood flows and its supply is known: from here on, all is the same whatever the machine
-        if patient.0.iter().any(|(state, supply)| state.flows() && !supply.vertices.is_empty()) {
-            let arteries = patient.1.iter().filter(|(system, ..)| system.0 == System::Arterial);
-            operation.site = arteries.filter_map(|(_, vessels, place)| Site::find(vessels, place, &surface)).next();
+        if patient.blood.iter().any(|(state, supply)| state.flows() && !supply.vertices.is_empty()) {
+            operation.site = patient.site(&surface);
             more.expected = operation.site.is_some();
         }
         return Ok(());
@@ -160,7 +192,7 @@ fn operate(
         draw_scalpel(vessels.in_stroke(stroke), [before, now].map(|at| site.scalpel(share(at), &surface)))?;
     }
     if is_due(CLAMP) {
-        clamp(&mut vessels, site.upstream);
+        patient.feeds_most().map(|(entity, place)| vessels.clamp_at(entity, place));
         looks.iter_mut().for_each(|mut look| look.coloring = SegmentColoring::Supply);
     }
     if is_due(CAUTERY) {
@@ -199,14 +231,31 @@ fn record(
         let path = args.out.join("blood_loss.csv");
         write_atomically(&path, |out| write_table(out, &operation.table))?;
         println!("{}", path.display());
+        let [cut, clamped, sealed] = [CLAMP, CAUTERY, END].map(|end| mean_rate(&operation.table, end));
+        println!("bleeding: {cut:.1} mL/min from the cut, {clamped:.1} with the clamp, {sealed:.1} after cautery");
     }
     Ok(())
 }
 
+/// What was lost up to a time, in mL/min.
+fn mean_rate(table: &[(f64, Reading)], end: f64) -> f64 {
+    let lost =
+        |at: f64| table.iter().rfind(|(time, _)| *time <= at).map_or((0.0, 0.0), |(time, now)| (*time, now.loss));
+    let ((from, before), (to, after)) = (lost(end - TOLD_OVER), lost(end));
+    60.0 * (after - before) / (to - from)
+}
+
+/// What was done last, at a time.
+fn last_step(time: f64) -> &'static str {
+    let steps = [(CAUTERY, "cautery"), (CLAMP, "clamp"), (CUT[0], "cut")];
+    steps.into_iter().find(|(at, _)| *at < time).map_or("none", |(_, step)| step)
+}
+
 fn write_table(out: &mut dyn Write, table: &[(f64, Reading)]) -> std::io::Result<()> {
-    writeln!(out, "time_s,rate_ml_per_min,loss_ml,open_ends,ischaemic_share,root_pressure_mmhg")?;
+    writeln!(out, "time_s,last_step,rate_ml_per_min,loss_ml,open_ends,ischaemic_share,root_pressure_mmhg")?;
     for (time, Reading { open_ends, rate, loss, ischaemic_share, root_pressure }) in table {
-        writeln!(out, "{time:.3},{rate:.4},{loss:.5},{open_ends},{ischaemic_share:.5},{root_pressure:.3}")?;
+        let step = last_step(*time);
+        writeln!(out, "{time:.3},{step},{rate:.4},{loss:.5},{open_ends},{ischaemic_share:.5},{root_pressure:.3}")?;
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use crate::plugin::{
     operations::{OperationError, OperationKind, VesselAction, VesselCommand, VesselOperation, VesselSite},
     probe::{Near, Touch, mean_scale, nearest_place},
     segment_changes::SegmentChanges,
-    vessel_index::VesselIndex,
+    vessel_index::{IndexedVessels, VesselIndex},
     vessels::Vessels,
     wounds::{Cuttable, VesselWounds},
 };
@@ -149,8 +149,7 @@ impl Theatre<'_, '_> {
 
     fn cut(&mut self, targets: &[Target], blade: &Blade) -> Outcome {
         self.sweep(targets, blade, OperationKind::Cut, |wounds, vessels, index, blade, _| {
-            let tree = vessels.tree();
-            Ok(wounds.cut(blade, tree, |region, visit| index.candidates(tree, region, visit)))
+            Ok(wounds.cut(blade, vessels.tree(), IndexedVessels { vessels, index }))
         })
     }
 

@@ -7,7 +7,7 @@
 use crate::plugin::vessels::{Lineage, Vessels};
 use crate::synthesis::{
     tree::{NO_PARENT, NodeId, VesselTree},
-    wound::{Region, SegmentIndex},
+    wound::{Region, SegmentIndex, SegmentSearch},
 };
 use bevy::{
     ecs::{change_detection::DetectChanges, component::Component, system::Query, world::Ref},
@@ -132,6 +132,22 @@ impl VesselIndex {
             self.task = Some(pool.spawn(async move { SegmentIndex::new(&tree) }));
             self.moved_meanwhile = Moved::None;
         }
+    }
+}
+
+/// Vessels with their index, to be cut.
+pub(crate) struct IndexedVessels<'a> {
+    pub(crate) vessels: &'a Vessels,
+    pub(crate) index: &'a VesselIndex,
+}
+
+impl SegmentSearch for IndexedVessels<'_> {
+    fn candidates(&mut self, region: &Region, visit: &mut dyn FnMut(NodeId)) {
+        self.index.candidates(self.vessels.tree(), region, visit);
+    }
+
+    fn leaving(&mut self, _: &VesselTree, node: NodeId, visit: &mut dyn FnMut(NodeId)) {
+        self.vessels.children(node.index()).for_each(|child| visit(NodeId(child as u32)));
     }
 }
 

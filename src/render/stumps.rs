@@ -2,7 +2,8 @@
 //!
 //! In: the [`Wounds`] of a tree and the nodes whose segments changed. Out: the segments that are drawn instead.
 //!
-//! Growth's rule stands: slot `i` of the buffer belongs to node `i`. A severed segment shows its first piece there. Its
+//! Growth's rule stands: slot `i` of the buffer belongs to node `i`. A severed segment shows its first piece there, and one
+//! whose round end would hide the gap of another is shown flat. Its
 //! further pieces have slots behind those of all nodes, in chunks of their own, with their own boxes. A cut, like its
 //! undoing, writes the slots of its segments and no others.
 
@@ -70,7 +71,7 @@ impl Stumps {
         changes: &SegmentChanges,
         len: usize,
     ) {
-        let is_healed = |node: NodeId| changes.contains(node.index()) && wounds.is_none_or(|all| !all.is_severed(node));
+        let is_healed = |node: NodeId| changes.contains(node.index()) && wounds.is_none_or(|all| !all.is_redrawn(node));
         let known = self.severed.keys().map(|&node| NodeId(node));
         let gone: Vec<NodeId> = known.filter(|&node| node.index() >= len || is_healed(node)).collect();
         for node in gone {
@@ -78,7 +79,7 @@ impl Stumps {
         }
         let Some(wounds) = wounds else { return };
         let mut pieces = Vec::new();
-        for node in wounds.severed_within(0..len).filter(|node| changes.contains(node.index())) {
+        for node in wounds.redrawn_within(0..len).filter(|node| changes.contains(node.index())) {
             pieces.clear();
             write_stumps_of(wounds, node, vessels.tree(), vessels.birth_steps(), colors, &mut pieces);
             self.insert(node, &pieces);

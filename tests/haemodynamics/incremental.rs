@@ -3,11 +3,12 @@
 use super::trees::{random_gap, random_tree, resisting, rng, settings, wound};
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    haemodynamics::{Network, NetworkUpdate},
+    haemodynamics::{FlowError, Interruption, Network, NetworkUpdate},
     tree::{NO_PARENT, NodeId, VesselTree},
     units::Pressure,
 };
 use rand::RngExt;
+use std::collections::BTreeSet;
 
 /// The same tree and wounds in a new network.
 fn anew(tree: &VesselTree, network: &Network) -> Network {
@@ -88,6 +89,66 @@ fn a_clamp_and_its_release_leave_no_trace() {
         assert_eq!(network.flows(), flows, "seed {seed}");
         assert_eq!(network.pressures(), pressures, "seed {seed}");
     }
+}
+
+/// Gaps at random segments, each once, in the order of the nodes.
+fn random_gaps(rng: &mut rand_chacha::ChaCha8Rng, tree: &VesselTree, count: usize) -> Vec<(NodeId, Interruption)> {
+    let nodes: BTreeSet<u32> = (0..count).map(|_| rng.random_range(0..tree.len() as u32)).collect();
+    let nodes = nodes.into_iter().map(NodeId).filter(|&node| tree.parent(node).is_some());
+    nodes.map(|node| (node, random_gap(rng))).collect()
+}
+
+#[test]
+fn many_gaps_at_once_are_the_same_as_one_by_one() {
+    for seed in 0..30 {
+        let mut rng = rng(seed);
+        // Large enough that few gaps are summed along their paths, and many in one sweep.
+        let tree = random_tree(&mut rng, 6_000);
+        let settings = if seed % 2 == 0 { settings() } else { resisting(1.0) };
+        let mut at_once = Network::new(&tree, settings).expect("valid numbers");
+        at_once.solve().expect("flow that converges");
+        let mut one_by_one = at_once.clone();
+        for count in [25, 40, 900, 30, 0, 700] {
+            let mut gaps = random_gaps(&mut rng, &tree, count);
+            // Some stay as they are, and keep how far they have closed.
+            gaps.extend(at_once.interruptions().filter(|(node, _)| node.0 % 3 == 0));
+            gaps.sort_by_key(|&(node, _)| node);
+            gaps.dedup_by_key(|&mut (node, _)| node);
+            at_once.set_interruptions(&gaps).expect("gaps");
+            for node in tree.segments().map(|(node, _)| NodeId(node as u32)) {
+                let gap = gaps.binary_search_by_key(&node, |&(node, _)| node).ok().map(|at| gaps[at].1);
+                one_by_one.set_interruption(node, gap).expect("a gap");
+            }
+            let what = format!("seed {seed}, {} gaps", gaps.len());
+            assert!(at_once.interruptions().eq(gaps.iter().copied()), "{what}");
+            for network in [&mut at_once, &mut one_by_one] {
+                let ends = network.open_ends().len();
+                (0..ends).step_by(5).for_each(|end| network.set_opening(end, 0.5).expect("a share"));
+                network.solve().expect("flow that converges");
+            }
+            // Bit for bit.
+            assert_eq!(at_once.open_ends(), one_by_one.open_ends(), "{what}");
+            assert_eq!(at_once.flows(), one_by_one.flows(), "{what}");
+            assert_eq!(at_once.pressures(), one_by_one.pressures(), "{what}");
+        }
+    }
+}
+
+#[test]
+fn a_faulty_list_of_gaps_changes_nothing() {
+    let mut rng = rng(5);
+    let tree = random_tree(&mut rng, 200);
+    let mut network = Network::new(&tree, settings()).expect("valid numbers");
+    let gaps = random_gaps(&mut rng, &tree, 40);
+    network.set_interruptions(&gaps).expect("gaps");
+    let mut unordered = gaps.clone();
+    unordered.swap(3, 7);
+    let fault = network.set_interruptions(&unordered);
+    assert!(matches!(fault, Err(FlowError::InterruptionsUnordered { .. })), "{fault:?}");
+    let mut backwards = gaps.clone();
+    (backwards[9].1.first, backwards[9].1.last) = (0.9, 0.1);
+    assert!(matches!(network.set_interruptions(&backwards), Err(FlowError::InterruptionBackwards { .. })));
+    assert!(network.interruptions().eq(gaps));
 }
 
 #[test]

@@ -8,3 +8,4 @@ mod indexed;
 mod ledger;
 mod random_actions;
 mod stumps;
+mod withdrawal;

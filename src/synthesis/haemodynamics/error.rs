@@ -62,6 +62,14 @@ pub enum FlowError {
         /// Share from which the vessel is intact again.
         last: f32,
     },
+    /// A list of interruptions out of order.
+    #[error("in a list of interruptions node {node} comes after node {before}; sort it by node, with each node once")]
+    InterruptionsUnordered {
+        /// The node that comes first.
+        before: u32,
+        /// The one after it, not above it.
+        node: u32,
+    },
     /// A root was to be interrupted.
     #[error("node {node} is a root, which has no segment; interrupt the segments that end in its children")]
     NoSegment {

@@ -78,15 +78,8 @@ impl Network {
     /// # Errors
     /// When there is no such node, it is a root, or a number is outside its limits.
     pub fn set_interruption(&mut self, node: NodeId, interruption: Option<Interruption>) -> Result<(), FlowError> {
-        self.check(node)?;
-        if let Some(interruption) = &interruption {
-            interruption.validate(node.0)?;
-        }
+        let parent = self.check_gap(node, interruption.as_ref())?;
         let slot = node_slot(node.index());
-        let parent = self.links[slot].parent;
-        if parent == SOURCE {
-            return Err(FlowError::NoSegment { node: node.0 });
-        }
         if self.interruption(node) == interruption {
             return Ok(());
         }
@@ -97,12 +90,10 @@ impl Network {
             (Err(_), None) => {}
         }
         self.revision += 1;
-        self.links[slot].upstream = if interruption.is_some() { REFERENCE } else { parent };
-        self.slots[slot].resistance = if interruption.is_some() { CLOSED } else { self.whole_resistance(node.index()) };
+        self.link(node, interruption.is_none());
         self.replace_ends(node, interruption);
         // The new ends count as closed until they are solved for.
-        self.load_shunt(slot as u32);
-        self.load_shunt(parent);
+        self.load_shunts(&[parent, slot as u32]);
         if !self.sums_stale {
             self.sum_path(slot as u32);
             self.sum_path(parent);
@@ -110,23 +101,94 @@ impl Network {
         Ok(())
     }
 
-    /// Takes the gaps of a list in place of all that there are, as after an undo. Costs what differs.
+    /// Takes the gaps of a list in place of all that there are, as after an undo: the same as taking one by one what
+    /// differs, at the cost of that, or of one sweep over the tree where that is less.
     ///
-    /// `interruptions` is in rising order of the nodes.
+    /// `interruptions` is in rising order of the nodes, each once.
     ///
     /// # Errors
-    /// As [`set_interruption`](Self::set_interruption); what came before the fault in the list has been taken.
+    /// As [`set_interruption`](Self::set_interruption), or when the nodes don't rise. The network is as before, then.
     pub fn set_interruptions(&mut self, interruptions: &[(NodeId, Interruption)]) -> Result<(), FlowError> {
-        let gone: Vec<u32> = self.interruptions.iter().map(|&(node, _)| node).collect();
-        for node in gone {
-            if interruptions.binary_search_by_key(&node, |&(node, _)| node.0).is_err() {
-                self.set_interruption(NodeId(node), None)?;
-            }
+        for (node, interruption) in interruptions {
+            self.check_gap(*node, Some(interruption))?;
         }
-        for &(node, interruption) in interruptions {
-            self.set_interruption(node, Some(interruption))?;
+        if let Some(pair) = interruptions.windows(2).find(|pair| pair[0].0 >= pair[1].0) {
+            return Err(FlowError::InterruptionsUnordered { before: pair[0].0.0, node: pair[1].0.0 });
+        }
+        let changed = self.differing(interruptions);
+        if changed.len() > Self::FEW_GAPS {
+            self.take_gaps(interruptions, &changed);
+            return Ok(());
+        }
+        for node in changed {
+            let at = interruptions.binary_search_by_key(&node, |&(node, _)| node).ok();
+            self.set_interruption(node, at.map(|at| interruptions[at].1))?;
         }
         Ok(())
+    }
+
+    /// Gaps up to which each is laid by itself.
+    const FEW_GAPS: usize = 16;
+    /// Nodes for each gap below which all sums are made anew, rather than those above the gaps: what a path costs.
+    const NODES_PER_PATH: usize = 128;
+
+    /// The nodes whose gaps are others in a list, in rising order.
+    fn differing(&self, interruptions: &[(NodeId, Interruption)]) -> Vec<NodeId> {
+        let mut before = self.interruptions.iter().map(|&(node, gap)| (NodeId(node), gap)).peekable();
+        let mut differing = Vec::new();
+        for &(node, gap) in interruptions {
+            while let Some((gone, _)) = before.next_if(|&(other, _)| other < node) {
+                differing.push(gone);
+            }
+            if before.next_if(|&(other, _)| other == node).is_none_or(|(_, old)| old != gap) {
+                differing.push(node);
+            }
+        }
+        differing.extend(before.map(|(gone, _)| gone));
+        differing
+    }
+
+    /// Takes the gaps of a list, which differ from those that there are at some nodes, and sums once.
+    fn take_gaps(&mut self, interruptions: &[(NodeId, Interruption)], changed: &[NodeId]) {
+        self.revision += 1;
+        self.interruptions = interruptions.iter().map(|&(node, gap)| (node.0, gap)).collect();
+        let mut touched = Vec::with_capacity(2 * changed.len());
+        for &node in changed {
+            self.link(node, self.interruption(node).is_none());
+            let slot = node_slot(node.index());
+            touched.extend([slot as u32, self.links[slot].parent]);
+        }
+        touched.sort_unstable();
+        touched.dedup();
+        let ends = interruptions.iter().flat_map(|&(node, gap)| ends_of(node, Some(gap))).flatten().collect();
+        self.ends.replace_all(ends, changed);
+        self.measure_ends();
+        self.load_shunts(&touched);
+        if changed.len() > self.len() / Self::NODES_PER_PATH {
+            self.sums_stale = true;
+        }
+        if !self.sums_stale {
+            self.sum_paths(touched);
+        }
+    }
+
+    /// Passes a gap, or its healing, and gives the slot of the segment's parent.
+    fn check_gap(&self, node: NodeId, interruption: Option<&Interruption>) -> Result<u32, FlowError> {
+        self.check(node)?;
+        if let Some(interruption) = interruption {
+            interruption.validate(node.0)?;
+        }
+        match self.links[node_slot(node.index())].parent {
+            SOURCE => Err(FlowError::NoSegment { node: node.0 }),
+            parent => Ok(parent),
+        }
+    }
+
+    /// Lets a segment carry blood, or none.
+    fn link(&mut self, node: NodeId, is_whole: bool) {
+        let slot = node_slot(node.index());
+        self.links[slot].upstream = if is_whole { self.links[slot].parent } else { REFERENCE };
+        self.slots[slot].resistance = if is_whole { self.whole_resistance(node.index()) } else { CLOSED };
     }
 
     /// Narrows an open end to a share of its outlet's area, as clotting does. 0 closes it.
@@ -146,13 +208,17 @@ impl Network {
 
     /// The open ends of an interruption in place of those that the segment had.
     fn replace_ends(&mut self, node: NodeId, interruption: Option<Interruption>) {
-        let open = interruption.map_or([None; 2], |gap| {
-            [
-                gap.proximal.map(|outlet| OpenEnd::new(node, EndSide::Proximal, gap.first, outlet)),
-                gap.distal.map(|outlet| OpenEnd::new(node, EndSide::Distal, gap.last, outlet)),
-            ]
-        });
-        self.ends.replace(node, open);
+        self.ends.replace(node, ends_of(node, interruption));
         self.measure_ends_of(node);
     }
+}
+
+/// The open ends of a gap, not measured yet.
+fn ends_of(node: NodeId, interruption: Option<Interruption>) -> [Option<OpenEnd>; 2] {
+    interruption.map_or([None; 2], |gap| {
+        [
+            gap.proximal.map(|outlet| OpenEnd::new(node, EndSide::Proximal, gap.first, outlet)),
+            gap.distal.map(|outlet| OpenEnd::new(node, EndSide::Distal, gap.last, outlet)),
+        ]
+    })
 }

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::synthesis::tree::NodeId;
 use crate::synthesis::units::{BLOOD_DENSITY, Flow, Pressure, Scale};
+use std::ops::Range;
 
 /// Which end of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -154,17 +155,40 @@ impl OpenEnds {
 
     /// Puts ends in the place of all that a segment had. One that is the same keeps its state.
     pub fn replace(&mut self, node: NodeId, ends: [Option<OpenEnd>; 2]) {
-        let from = self.list.partition_point(|end| end.node < node);
-        let to = self.list.partition_point(|end| end.node <= node);
+        let indices = self.indices_of(node);
         let kept = |end: OpenEnd| {
-            let before = self.list[from..to].iter().find(|before| before.is_same(&end));
+            let before = self.list[indices.clone()].iter().find(|before| before.is_same(&end));
             let mut end = before.copied().unwrap_or(end);
             // The network below it is another one now.
             end.stump = Shunt::default();
             end
         };
         let ends = ends.map(|end| end.map(kept));
-        self.list.splice(from..to, ends.into_iter().flatten());
+        self.list.splice(indices.clone(), ends.into_iter().flatten());
+        self.is_untraced = true;
+    }
+
+    /// Where the ends of a segment are in the list.
+    fn indices_of(&self, node: NodeId) -> Range<usize> {
+        self.list.partition_point(|end| end.node < node)..self.list.partition_point(|end| end.node <= node)
+    }
+
+    /// Puts ends in the place of all that there are, in the order of the node, proximal before distal. One that is the same
+    /// keeps its state; those of `changed` segments, which are in rising order, draw nothing until they are solved for.
+    pub fn replace_all(&mut self, ends: Vec<OpenEnd>, changed: &[NodeId]) {
+        let mut before = std::mem::replace(&mut self.list, ends).into_iter().peekable();
+        let mut changed = changed.iter().peekable();
+        for end in &mut self.list {
+            let key = (end.node, end.side);
+            while before.next_if(|old| (old.node, old.side) < key).is_some() {}
+            while changed.next_if(|&&node| node < end.node).is_some() {}
+            if let Some(old) = before.next_if(|old| old.is_same(end)) {
+                *end = old;
+            }
+            if changed.peek() == Some(&&end.node) {
+                end.stump = Shunt::default();
+            }
+        }
         self.is_untraced = true;
     }
 
@@ -297,10 +321,8 @@ impl Network {
 
     /// Measures the ends of one segment.
     pub(super) fn measure_ends_of(&mut self, node: NodeId) {
-        for index in 0..self.ends.list.len() {
-            if self.ends.list[index].node == node {
-                self.measure_end(index);
-            }
+        for index in self.ends.indices_of(node) {
+            self.measure_end(index);
         }
     }
 
@@ -353,13 +375,16 @@ impl Network {
         }
     }
 
-    /// What leaves one node that is no child: the bed, and its open ends as of the last solution.
-    pub(super) fn load_shunt(&mut self, slot: u32) {
-        let mut shunt = self.beds[slot as usize];
-        for end in self.ends.list.iter().filter(|end| end.attached == slot) {
+    /// Puts into the shunts of some slots, which rise, what leaves their nodes and is no child: the bed, and the open ends
+    /// as of the last solution.
+    pub(super) fn load_shunts(&mut self, slots: &[u32]) {
+        for &slot in slots {
+            self.shunts[slot as usize] = self.beds[slot as usize];
+        }
+        for end in self.ends.list.iter().filter(|end| slots.binary_search(&end.attached).is_ok()) {
+            let shunt = &mut self.shunts[end.attached as usize];
             shunt.y += end.stump.y;
             shunt.s += end.stump.s;
         }
-        self.shunts[slot as usize] = shunt;
     }
 }

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::synthesis::tree::NodeId;
 use crate::synthesis::units::Pressure;
+use std::collections::BinaryHeap;
 
 impl Network {
     /// Brings pressures and flows of all nodes up to date.
@@ -104,6 +105,17 @@ impl Network {
         while index > SOURCE {
             self.sum_at(index);
             index = self.links[index as usize].upstream;
+        }
+    }
+
+    /// The sums of some nodes and of all above them, each once: a parent's slot is below its children's.
+    pub(super) fn sum_paths(&mut self, slots: Vec<u32>) {
+        let mut due = BinaryHeap::from(slots);
+        while let Some(slot) = due.pop().filter(|&slot| slot > SOURCE) {
+            if due.peek() != Some(&slot) {
+                self.sum_at(slot);
+                due.push(self.links[slot as usize].upstream);
+            }
         }
     }
 

@@ -3,12 +3,10 @@
 //! Gaps lie in order along the segment and don't overlap; between them are its pieces, as many as gaps and one more,
 //! some of them without length. A clamp, tie or seal lies on a piece. One on the very tip of a piece belongs to that
 //! piece; where two tips touch, to the one towards the root.
+//!
+//! How far a gap reaches is decided where the whole tree is seen: see `withdrawal`.
 
 use crate::synthesis::haemodynamics::EndSide;
-
-/// How much of the piece it belongs to an end draws back by at most. Below one half, so that a piece between two cuts
-/// never vanishes.
-pub(super) const MOST_RETRACTION: f32 = 0.45;
 
 /// A severed end, by its index in the ledger.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,8 +23,13 @@ pub(super) struct Gap {
     pub to: f32,
     /// The end that the vessel has at `from`; `None` where what lay before it is gone with its parent's node.
     pub proximal: Option<Tip>,
-    /// The end at `to`.
+    /// The end at `to`; `None` where what lay behind it is gone with the segment's own node.
     pub distal: Option<Tip>,
+}
+
+impl Gap {
+    /// A segment that is gone altogether.
+    pub const WHOLE: Self = Self { from: 0.0, to: 1.0, proximal: None, distal: None };
 }
 
 /// What closes the lumen.
@@ -65,7 +68,12 @@ pub(super) struct Injury {
     gaps: Vec<Gap>,
     /// In the order of `from`.
     closures: Vec<Closure>,
+    /// Whether it is drawn flat in its parent, and in its own node, where a round end would reach into a gap.
+    flat: [bool; 2],
 }
+
+/// That of a segment to which nothing was done.
+pub(super) static NO_INJURY: Injury = Injury { gaps: Vec::new(), closures: Vec::new(), flat: [false; 2] };
 
 /// A stretch that a volume takes out, as [`Severed`](super::Severed).
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +86,27 @@ pub(super) struct Removal {
 
 impl Injury {
     pub fn is_empty(&self) -> bool {
-        self.gaps.is_empty() && self.closures.is_empty()
+        !(self.is_redrawn() || self.is_injured())
+    }
+
+    /// Whether the vessel is severed or held shut.
+    pub fn is_injured(&self) -> bool {
+        !(self.gaps.is_empty() && self.closures.is_empty())
+    }
+
+    /// Whether it is drawn otherwise than it grew.
+    pub fn is_redrawn(&self) -> bool {
+        !self.gaps.is_empty() || self.flat != [false; 2]
+    }
+
+    /// Whether it is drawn flat in its parent, and in its own node.
+    pub fn flat(&self) -> [bool; 2] {
+        self.flat
+    }
+
+    /// Draws it flat on one side from now on: 0 in its parent, 1 in its own node. Returns whether that is new.
+    pub fn flatten(&mut self, side: usize) -> bool {
+        !std::mem::replace(&mut self.flat[side], true)
     }
 
     pub fn gaps(&self) -> &[Gap] {
@@ -111,84 +139,41 @@ impl Injury {
         self.closures.iter().filter(move |closure| self.piece_of(closure) == piece)
     }
 
-    /// Severs the segment at rising shares, where there is a vessel. Ends draw back by `retraction`, a share of the
-    /// segment, but not past what holds them. Returns at how many of the shares there was one.
-    pub fn cut(
-        &mut self,
-        shares: impl Iterator<Item = f32> + Clone,
-        retraction: f32,
-        mut new_end: impl FnMut() -> u32,
-    ) -> usize {
-        let shares = shares.filter(|&share| !self.gaps.iter().any(|gap| gap.from <= share && share <= gap.to));
-        let gaps: Vec<Gap> = shares
-            .clone()
-            .map(|share| {
-                // Another cut of the same blade limits an end as an older one does.
-                let below = shares.clone().filter(|&other| other < share).fold(self.hold_below(share), f32::max);
-                let above = shares.clone().filter(|&other| other > share).fold(self.hold_above(share), f32::min);
-                let (sealed_below, sealed_above) = (self.is_sealed_below(share), self.is_sealed_above(share));
-                Gap {
-                    from: share - retraction.min(MOST_RETRACTION * (share - below)),
-                    to: share + retraction.min(MOST_RETRACTION * (above - share)),
-                    proximal: Some(Tip { end: new_end(), sealed: sealed_below }),
-                    distal: Some(Tip { end: new_end(), sealed: sealed_above }),
-                }
-            })
-            .collect();
-        for gap in &gaps {
-            self.clear_closures(gap.from, gap.to);
-        }
-        self.gaps.extend_from_slice(&gaps);
-        self.gaps.sort_by(|a, b| a.from.total_cmp(&b.from));
-        gaps.len()
+    /// The gap in which a share lies, its ends included.
+    pub fn gap_at(&self, share: f32) -> Option<&Gap> {
+        self.gaps.iter().find(|gap| gap.from <= share && share <= gap.to)
     }
 
-    /// Takes a stretch out. Ends within it are gone; new ones are where it severs a vessel. Returns at how many places it
-    /// does, or `None` where it takes out nothing that was still there.
-    pub fn remove(&mut self, removal: Removal, retraction: f32, mut new_end: impl FnMut() -> u32) -> Option<usize> {
-        let Removal { from, to, enters, leaves } = removal;
-        let holds = |share: f32| self.gaps.iter().find(|gap| gap.from <= share && share <= gap.to);
-        let mut severs = 0;
-        let (start, proximal) = match holds(from) {
-            _ if !enters => (0.0, None),
-            Some(gap) => (gap.from, gap.proximal),
-            None => {
-                severs += 1;
-                let back = retraction.min(MOST_RETRACTION * (from - self.hold_below(from)));
-                let sealed = self.is_sealed_below(from);
-                (from - back, Some(Tip { end: new_end(), sealed }))
-            }
-        };
-        let (end, distal) = match holds(to) {
-            _ if !leaves => (1.0, None),
-            Some(gap) => (gap.to, gap.distal),
-            None => {
-                severs += 1;
-                let back = retraction.min(MOST_RETRACTION * (self.hold_above(to) - to));
-                let sealed = self.is_sealed_above(to);
-                (to + back, Some(Tip { end: new_end(), sealed }))
-            }
-        };
-        let gap = Gap { from: start, to: end, proximal, distal };
+    /// Opens a gap where there is a vessel.
+    pub fn open(&mut self, gap: Gap) {
+        self.clear_closures(gap.from, gap.to);
+        let at = self.gaps.partition_point(|other| other.from <= gap.from);
+        self.gaps.insert(at, gap);
+    }
+
+    /// Takes a stretch out, and leaves a gap that holds it. Ends within that are gone. Returns whether it took out
+    /// anything that was still there.
+    pub fn take_out(&mut self, removal: Removal, gap: Gap) -> bool {
         if self.gaps.contains(&gap) {
-            return None;
+            return false;
         }
+        let Removal { from, to, enters, leaves } = removal;
         let is_gone = |closure: &Closure| {
             closure.kind != ClosureKind::Seal && ((!enters && closure.from <= to) || (!leaves && closure.from >= from))
         };
         self.closures.retain(|closure| !is_gone(closure));
-        self.clear_closures(start, end);
-        self.gaps.retain(|other| other.to < start || other.from > end);
-        let at = self.gaps.partition_point(|other| other.from < start);
-        self.gaps.insert(at, gap);
-        Some(severs)
+        self.gaps.retain(|other| other.to < gap.from || other.from > gap.to);
+        self.open(gap);
+        true
     }
 
-    fn is_sealed_below(&self, share: f32) -> bool {
+    /// Whether an end that looks towards the tips would be sealed at a share.
+    pub fn is_sealed_below(&self, share: f32) -> bool {
         self.seals().any(|seal| seal.from < share && share <= seal.to)
     }
 
-    fn is_sealed_above(&self, share: f32) -> bool {
+    /// Whether an end that looks towards the root would be sealed at a share.
+    pub fn is_sealed_above(&self, share: f32) -> bool {
         self.seals().any(|seal| seal.from <= share && share < seal.to)
     }
 
@@ -196,18 +181,22 @@ impl Injury {
         self.closures.iter().filter(|closure| closure.kind == ClosureKind::Seal)
     }
 
-    /// Where an end that draws back towards the root from `share` is held: by a gap, a clamp, a tie or the parent.
-    fn hold_below(&self, share: f32) -> f32 {
-        let clamped = self.closures.iter().filter(|closure| closure.kind != ClosureKind::Seal);
-        let holds = self.gaps.iter().map(|gap| gap.to).chain(clamped.map(|closure| closure.from));
-        holds.filter(|&hold| hold <= share).fold(0.0, f32::max)
+    /// What holds an end that draws back towards the root from `share`: a gap, a clamp or a tie. `None` where it may go
+    /// on to the parent.
+    pub fn hold_below(&self, share: f32) -> Option<f32> {
+        let holds = self.gaps.iter().map(|gap| gap.to).chain(self.clamped());
+        holds.filter(|&hold| hold <= share).reduce(f32::max)
     }
 
-    /// Where an end that draws back towards the node is held. A clamp at `share` itself stays with the other end.
-    fn hold_above(&self, share: f32) -> f32 {
-        let clamped = self.closures.iter().filter(|closure| closure.kind != ClosureKind::Seal);
-        let holds = self.gaps.iter().map(|gap| gap.from).chain(clamped.map(|closure| closure.from));
-        holds.filter(|&hold| hold > share).fold(1.0, f32::min)
+    /// What holds an end that draws back towards the node. A clamp at `share` itself stays with the other end.
+    pub fn hold_above(&self, share: f32) -> Option<f32> {
+        let holds = self.gaps.iter().map(|gap| gap.from).chain(self.clamped());
+        holds.filter(|&hold| hold > share).reduce(f32::min)
+    }
+
+    /// Where clamps and ties are.
+    fn clamped(&self) -> impl Iterator<Item = f32> {
+        self.closures.iter().filter(|closure| closure.kind != ClosureKind::Seal).map(|closure| closure.from)
     }
 
     /// Takes away what closes a stretch that is there no longer. Seals that reach beyond it keep the rest.

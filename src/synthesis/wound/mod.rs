@@ -11,8 +11,8 @@
 //!
 //! - A vessel is severed where its centre line crosses a blade: see [`severed`] for what counts and how exact it is.
 //! - A ball or capsule takes out all that lies within it, and severs what passes its boundary.
-//! - Severed ends draw back at once, by [`Retraction`], along their segment and not past its ends. Where no vessel is
-//!   left, a blade severs nothing and a clamp finds no hold.
+//! - Severed ends draw back at once, by [`Retraction`], over as many segments as it takes, but not past a branching.
+//!   Where no vessel is left, a blade severs nothing and a clamp finds no hold.
 //! - An end is open while it is not sealed, and no clamp, tie or seal is on the piece of its segment that it ends.
 //! - What closes a vessel is a place without length; a cut through it leaves it on the end towards the root. A cut
 //!   through a sealed stretch opens nothing.
@@ -55,9 +55,11 @@ mod region;
 mod report;
 mod retraction;
 mod round_cone;
+mod search;
 mod segment_index;
 mod segment_run;
 mod stumps;
+mod withdrawal;
 mod wounds;
 
 pub use crate::synthesis::haemodynamics::EndSide;
@@ -71,6 +73,7 @@ pub use ischaemia::{Supply, TissueSupply};
 pub use region::Region;
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
 pub use retraction::Retraction;
+pub use search::SegmentSearch;
 pub use segment_index::SegmentIndex;
 pub use stumps::{Blockage, Piece, PieceKind, write_stumps, write_stumps_of};
 pub use wounds::Wounds;

@@ -4,8 +4,9 @@ use super::WoundError;
 
 /// How far severed ends draw back along their vessel.
 ///
-/// An end stays on its segment, and keeps more than half of the piece that it ends: a piece between two cuts never
-/// vanishes. A clamp, a tie or the next node holds it.
+/// It goes on through nodes that only join two segments, so that it is the same however finely a vessel is divided. A
+/// branching, a root or terminal, a clamp or tie, and the gap of another cut hold it: of the way to there an end draws
+/// back by at most [`Self::MOST`], so that a piece between two of them never vanishes, and keeps its lumen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
@@ -31,6 +32,8 @@ impl Retraction {
     pub const DEFAULT_RADII: f32 = 1.5;
     /// Nothing beside.
     pub const DEFAULT_LENGTH: f32 = 0.0;
+    /// Most of the way to what holds an end that it draws back by. Below one half, so that two ends never meet.
+    pub const MOST: f32 = 0.45;
 
     /// Passes settings within their limits.
     ///

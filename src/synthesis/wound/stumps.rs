@@ -65,14 +65,16 @@ impl Blockage {
 }
 
 /// How far the round end that a segment is drawn with reaches beyond its end, in radii.
-const END_DOME: f32 = 1.0;
+pub(super) const END_DOME: f32 = 1.0;
 /// The same beyond its start, where the dome is shallow.
-const START_DOME: f32 = 0.4;
+pub(super) const START_DOME: f32 = 0.4;
+/// How deep one looks into the lumen of an open end, in radii.
+pub(super) const LUMEN_DEPTH: f32 = 1.2;
 /// Most of a piece that the round ends of its cuts may take.
 const MOST_DOME: f32 = 0.9;
 
 impl Wounds {
-    /// Whether the segment of a node is severed, so that its pieces are drawn in its place.
+    /// Whether the segment of a node is severed, so that only its pieces are left.
     pub fn is_severed(&self, node: NodeId) -> bool {
         self.injury(node).is_some_and(|injury| !injury.gaps().is_empty())
     }
@@ -85,6 +87,18 @@ impl Wounds {
     /// The severed segments of a range of nodes, in their order, at the cost of those alone.
     pub fn severed_within(&self, nodes: Range<usize>) -> impl Iterator<Item = NodeId> + '_ {
         self.injuries_within(nodes).filter(|(_, injury)| !injury.gaps().is_empty()).map(|(node, _)| node)
+    }
+
+    /// Whether the segment of a node is drawn otherwise than it grew, by [`write_stumps_of`]: because it is severed, or
+    /// because its round end would hide the gap of another.
+    pub fn is_redrawn(&self, node: NodeId) -> bool {
+        self.injury(node).is_some_and(Injury::is_redrawn)
+    }
+
+    /// The segments of a range of nodes that are drawn otherwise than they grew, in their order, at the cost of those that
+    /// anything was done to.
+    pub fn redrawn_within(&self, nodes: Range<usize>) -> impl Iterator<Item = NodeId> + '_ {
+        self.injuries_within(nodes).filter(|(_, injury)| injury.is_redrawn()).map(|(node, _)| node)
     }
 
     /// What is left of a severed segment, from parent to node; nothing of one that is whole, or wholly taken out.
@@ -104,12 +118,13 @@ impl Wounds {
 
     /// How far blood may come into a segment; `None` for one to which nothing was done.
     pub fn blockage(&self, node: NodeId) -> Option<Blockage> {
-        self.injury(node).map(|injury| self.blockage_of(node, injury))
+        self.injury(node).filter(|injury| injury.is_injured()).map(|injury| self.blockage_of(node, injury))
     }
 
     /// How far blood may come into each injured segment, in the order of their nodes.
     pub fn blockages(&self) -> impl Iterator<Item = Blockage> + '_ {
-        self.injuries().map(|(node, injury)| self.blockage_of(node, injury))
+        let injured = self.injuries().filter(|(_, injury)| injury.is_injured());
+        injured.map(|(node, injury)| self.blockage_of(node, injury))
     }
 
     fn blockage_of(&self, node: NodeId, injury: &Injury) -> Blockage {
@@ -178,8 +193,8 @@ fn nearest_on(start: Vec3, end: Vec3, [from, to]: [f32; 2], point: Vec3) -> (f32
     (share, start.lerp(end, f64::from(share)).distance(point) as f32)
 }
 
-/// Appends to `out` what is left of the severed segments, as instances: in the order of their nodes, then from parent to
-/// node. Their own slots are to be hidden while [`Wounds::is_severed`].
+/// Appends to `out` what is left of the severed segments, and those beside them that are drawn otherwise, as instances: in
+/// the order of their nodes, then from parent to node. Their own slots are to be hidden while [`Wounds::is_redrawn`].
 ///
 /// `birth_steps` and `colors` as for [`write_segments`](crate::synthesis::instances::write_segments).
 pub fn write_stumps(
@@ -189,16 +204,17 @@ pub fn write_stumps(
     colors: &SegmentColors,
     out: &mut Vec<SegmentInstance>,
 ) {
-    for node in wounds.severed_segments() {
+    for node in wounds.redrawn_within(0..tree.len()) {
         write_stumps_of(wounds, node, tree, birth_steps, colors, out);
     }
 }
 
-/// Appends what is left of one segment; nothing if it is whole, wholly taken out, or not of the tree.
+/// Appends what is left of one segment; nothing if it is drawn as it grew, wholly taken out, or not of the tree.
 ///
 /// A piece is drawn with the taper that the whole segment has. An end with a lumen is
 /// [open](SegmentInstance::is_open), and ends flat. A sealed one is round; its round end stays within the piece, and one
-/// too short for it ends more bluntly. So gaps are as wide as the ledger has them.
+/// too short for it ends more bluntly. Whole segments whose round ends would reach past it are open, too, where the next
+/// segment covers that. So gaps are as wide as the ledger has them.
 pub fn write_stumps_of(
     wounds: &Wounds,
     node: NodeId,
@@ -207,10 +223,28 @@ pub fn write_stumps_of(
     colors: &SegmentColors,
     out: &mut Vec<SegmentInstance>,
 ) {
-    let (Some(injury), Some(ends)) = (wounds.injury(node), segment(tree, node)) else { return };
+    let (Some(injury), Some([start, end])) = (wounds.injury(node), segment(tree, node)) else { return };
+    if !injury.is_redrawn() {
+        return;
+    }
     let birth = birth_steps.get(node.index()).copied().unwrap_or(0);
     let whole = segment_instance(tree, node.index(), birth, colors);
-    out.extend(wounds.pieces(node).map(|piece| draw(&whole, ends, piece, tips(injury, piece))));
+    let cover = cover(wounds, tree, node, end - start);
+    for [from, to] in injury.pieces().filter(|[from, to]| from < to) {
+        out.push(draw(&whole, [start, end], [from, to], ends(injury, [from, to]), cover));
+    }
+}
+
+/// How far a segment is drawn into its parent, to cover the rim of that where it is flat and the vessel bends there. 0
+/// where the parent has its round end.
+fn cover(wounds: &Wounds, tree: &VesselTree, node: NodeId, along: Vec3) -> f32 {
+    let Some(parent) = tree.parent(node) else { return 0.0 };
+    if !wounds.injury(parent).is_some_and(|injury| injury.flat()[1]) {
+        return 0.0;
+    }
+    let (before, along) = (tree.segment_vector(parent.index()).normalize_or_zero(), along.normalize_or_zero());
+    let sine = if before.dot(along) > 0.0 { before.cross(along).length() } else { 1.0 };
+    sine * tree.radii()[parent.index()]
 }
 
 /// How a piece ends.
@@ -220,43 +254,54 @@ enum PieceEnd {
     Node,
     /// At a cut that was sealed.
     Sealed,
-    /// At a cut, with its lumen open.
+    /// At a cut, with its lumen open, or in a node where a round end would be in the way.
     Open,
 }
 
 /// How a piece ends towards the parent, and towards the node.
-fn tips(injury: &Injury, piece: Piece) -> [PieceEnd; 2] {
-    let end = |gap: Option<&Gap>, tip: fn(&Gap) -> Option<Tip>| match gap.map(tip) {
-        None => PieceEnd::Node,
+fn ends(injury: &Injury, [from, to]: [f32; 2]) -> [PieceEnd; 2] {
+    let end = |gap: Option<&Gap>, tip: fn(&Gap) -> Option<Tip>, flat: bool| match gap.map(tip) {
+        None if !flat => PieceEnd::Node,
+        None => PieceEnd::Open,
         Some(Some(tip)) if !tip.sealed => PieceEnd::Open,
         Some(_) => PieceEnd::Sealed,
     };
-    let before = injury.gaps().iter().find(|gap| gap.to == piece.from);
-    let after = injury.gaps().iter().find(|gap| gap.from == piece.to);
-    [end(before, |gap| gap.distal), end(after, |gap| gap.proximal)]
+    let before = injury.gaps().iter().find(|gap| gap.to == from);
+    let after = injury.gaps().iter().find(|gap| gap.from == to);
+    let [flat_start, flat_end] = injury.flat();
+    [end(before, |gap| gap.distal, flat_start), end(after, |gap| gap.proximal, flat_end)]
 }
 
-fn draw(whole: &SegmentInstance, [start, end]: [Vec3; 2], piece: Piece, tips: [PieceEnd; 2]) -> SegmentInstance {
+fn draw(
+    whole: &SegmentInstance,
+    [start, end]: [Vec3; 2],
+    [from, to]: [f32; 2],
+    ends: [PieceEnd; 2],
+    cover: f32,
+) -> SegmentInstance {
     let length = start.distance(end);
     let radius = |share: f32| whole.start_radius + (whole.end_radius - whole.start_radius) * share;
-    let room = MOST_DOME * length * (piece.to - piece.from);
+    let room = MOST_DOME * length * (to - from);
     let domes = [
-        if tips[0] == PieceEnd::Sealed { START_DOME * radius(piece.from) } else { 0.0 },
-        if tips[1] == PieceEnd::Sealed { END_DOME * radius(piece.to) } else { 0.0 },
+        if ends[0] == PieceEnd::Sealed { START_DOME * radius(from) } else { 0.0 },
+        if ends[1] == PieceEnd::Sealed { END_DOME * radius(to) } else { 0.0 },
     ];
     // How much of their size the round ends have room for.
     let fit = (room / (domes[0] + domes[1]).max(f32::MIN_POSITIVE)).min(1.0);
-    let [back, ahead] = domes.map(|dome| fit * dome / length);
-    let size = |tip: PieceEnd, share: f32| match tip {
+    let [mut back, ahead] = domes.map(|dome| fit * dome / length);
+    if ends[0] == PieceEnd::Node {
+        back = -cover / length;
+    }
+    let size = |end: PieceEnd, share: f32| match end {
         PieceEnd::Node => radius(share),
         PieceEnd::Sealed => fit * radius(share),
         PieceEnd::Open => -radius(share),
     };
     SegmentInstance {
-        start: start.lerp(end, piece.from + back).to_array(),
-        start_radius: size(tips[0], piece.from),
-        end: start.lerp(end, piece.to - ahead).to_array(),
-        end_radius: size(tips[1], piece.to),
+        start: start.lerp(end, from + back).to_array(),
+        start_radius: size(ends[0], from),
+        end: start.lerp(end, to - ahead).to_array(),
+        end_radius: size(ends[1], to),
         ..*whole
     }
 }

@@ -2,8 +2,11 @@
 
 use super::blade::Shape;
 use super::crossing::{Severed, segment, severed, within};
-use super::injury::{ClosureKind, End, Injury, Removal};
-use super::{Blade, BladeError, ClampId, EndId, Region, Retraction, SeveredEnd, WoundError, WoundReport};
+use super::injury::{ClosureKind, End, Injury, NO_INJURY};
+use super::withdrawal::Plan;
+use super::{
+    Blade, BladeError, ClampId, EndId, Region, Retraction, SegmentSearch, SeveredEnd, WoundError, WoundReport,
+};
 use crate::synthesis::haemodynamics::EndSide;
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
 use std::{collections::BTreeMap, ops::Range};
@@ -14,7 +17,8 @@ use std::{collections::BTreeMap, ops::Range};
 /// calls take the tree that the wounds belong to; after another one took its place, [`clear`](Self::clear).
 ///
 /// `candidates(region, visit)` is the index over the tree's segments: it calls `visit` with at least those that meet a
-/// region, as [`SegmentIndex::candidates_in`](super::SegmentIndex::candidates_in) does.
+/// region, as [`SegmentIndex::candidates_in`](super::SegmentIndex::candidates_in) does. A cut asks more of it, which the
+/// same closure answers: see [`SegmentSearch`].
 #[derive(Clone, Debug, Default)]
 pub struct Wounds {
     retraction: Retraction,
@@ -88,33 +92,33 @@ impl Wounds {
     /// Severs every vessel that the blade crosses; a ball or capsule also takes out what lies within it.
     ///
     /// The blade is in the tree's space: see [`Blade::to_local`]. What counts as crossed is said at
-    /// [`severed`]. Gaps are no vessel: what crosses one severs nothing there.
-    pub fn cut(
-        &mut self,
-        blade: &Blade,
-        tree: &VesselTree,
-        candidates: impl FnMut(&Region, &mut dyn FnMut(NodeId)),
-    ) -> WoundReport {
+    /// [`severed`]. Gaps are no vessel: what crosses one severs nothing there. How far the ends draw back, and what holds
+    /// them, is said at [`Retraction`].
+    pub fn cut(&mut self, blade: &Blade, tree: &VesselTree, mut search: impl SegmentSearch) -> WoundReport {
         let mut hits = std::mem::take(&mut self.hits);
-        severed(blade, tree, candidates, &mut hits);
+        severed(blade, tree, |region, visit| search.candidates(region, visit), &mut hits);
         let action = self.begin();
-        let mut places = 0;
-        for of_segment in hits.chunk_by(|a, b| a.node == b.node) {
-            let node = of_segment[0].node;
-            let retraction = self.retraction_share(tree, node);
-            self.change(node.0, |injury, made| {
-                let severs = if blade.is_volume() {
-                    let Severed { from, to, enters, leaves, .. } = of_segment[0];
-                    injury.remove(Removal { from, to, enters, leaves }, retraction, || made.end())
-                } else {
-                    let severs = injury.cut(of_segment.iter().map(|hit| hit.from), retraction, || made.end());
-                    (severs > 0).then_some(severs)
-                };
-                places += severs.unwrap_or(0);
-                severs.is_some()
+        let mut plan = Plan::new(tree, &self.injuries, &hits, search, self.retraction);
+        let generation = self.generation + 1;
+        let ends = &mut self.ends;
+        let mut new_end = |node: NodeId| {
+            ends.push(Record { node: node.0, generation });
+            ends.len() as u32 - 1
+        };
+        if blade.is_volume() {
+            plan.take_out(&mut new_end)
+        } else {
+            plan.cut(&mut new_end)
+        }
+        let Plan { severed: places, mut changes, .. } = plan;
+        self.hits = hits;
+        // In the order in which they were planned, where a segment has several.
+        changes.sort_by_key(|&(node, _)| node);
+        for of_segment in changes.chunk_by(|(a, _), (b, _)| a == b) {
+            self.change(of_segment[0].0, |injury, _| {
+                of_segment.iter().fold(false, |changed, (_, change)| change.apply(injury) || changed)
             });
         }
-        self.hits = hits;
         WoundReport { severed: places, ..self.finish(action, tree) }
     }
 
@@ -214,7 +218,7 @@ impl Wounds {
     pub fn undo_all(&mut self, tree: &VesselTree) -> WoundReport {
         let mut report = WoundReport::default();
         for (&node, injury) in &self.injuries {
-            self.compare(tree, node, injury, &Injury::default(), &mut report);
+            self.compare(tree, node, injury, &NO_INJURY, &mut report);
         }
         self.clear();
         report
@@ -255,7 +259,7 @@ impl Wounds {
 
     /// The segments that anything was done to, in the order of their nodes.
     pub fn injured(&self) -> impl Iterator<Item = NodeId> + '_ {
-        self.injuries.keys().map(|&node| NodeId(node))
+        self.injuries().filter(|(_, injury)| injury.is_injured()).map(|(node, _)| node)
     }
 
     pub(super) fn injury(&self, node: NodeId) -> Option<&Injury> {
@@ -304,7 +308,7 @@ impl Wounds {
         let before = self.injuries.remove(&node).unwrap_or_default();
         let mut injury = before.clone();
         let record = Record { node, generation: self.generation + 1 };
-        let changed = change(&mut injury, &mut Made { record, ends: &mut self.ends, clamps: &mut self.clamps });
+        let changed = change(&mut injury, &mut Made { record, clamps: &mut self.clamps });
         if !injury.is_empty() {
             self.injuries.insert(node, injury);
         }
@@ -321,9 +325,8 @@ impl Wounds {
         }
         self.generation += 1;
         self.journal.push(action);
-        let none = Injury::default();
         for (node, before) in &self.before[action.before..] {
-            let now = self.injuries.get(node).unwrap_or(&none);
+            let now = self.injuries.get(node).unwrap_or(&NO_INJURY);
             self.compare(tree, *node, before, now, &mut report);
         }
         report
@@ -365,27 +368,15 @@ impl Wounds {
             radius: tree.radii()[place.node.index()],
         })
     }
-
-    /// Retraction as a share of a segment.
-    fn retraction_share(&self, tree: &VesselTree, node: NodeId) -> f32 {
-        let length = tree.segment_vector(node.index()).length();
-        (self.retraction.radii * tree.radii()[node.index()] + self.retraction.length) / length
-    }
 }
 
-/// Gives out ends and clamps for one segment.
+/// Gives out clamps for one segment.
 struct Made<'a> {
     record: Record,
-    ends: &'a mut Vec<Record>,
     clamps: &'a mut Vec<Record>,
 }
 
 impl Made<'_> {
-    fn end(&mut self) -> u32 {
-        self.ends.push(self.record);
-        self.ends.len() as u32 - 1
-    }
-
     fn clamp(&mut self) -> u32 {
         self.clamps.push(self.record);
         self.clamps.len() as u32 - 1

@@ -1,0 +1,305 @@
+//! Where severed ends come to rest, and what of the tree changes with that.
+//!
+//! In: a tree with its wounds, all places at which a blade severs it, and a [`Retraction`]. Out: the changes to each
+//! segment, planned before any of them is made, so that the order of the places makes no difference.
+//!
+//! An end draws back along the centre line, through nodes that only join two segments. Segments that it passes are taken
+//! out; the end lies on the one where it comes to rest. Wherever it lies, the round ends of whole segments nearby would
+//! reach past its tip and hide the gap, or fill the lumen, where segments are shorter than they are wide. Those are drawn
+//! flat from now on.
+
+use super::crossing::{Severed, segment};
+use super::injury::{Gap, Injury, NO_INJURY, Removal, Tip};
+use super::stumps::{END_DOME, LUMEN_DEPTH, START_DOME};
+use super::{Retraction, SegmentSearch};
+use crate::synthesis::haemodynamics::EndSide;
+use crate::synthesis::instances::MAX_FLARE;
+use crate::synthesis::tree::{NodeId, Place, VesselTree};
+use std::collections::BTreeMap;
+
+/// How wide another branch may be, as a share of a vessel, that this vessel is drawn flat where both leave it. A wider one
+/// would be seen to end in the air.
+const THIN_BRANCH: f32 = 0.5;
+
+/// [`Retraction::MOST`], for lengths.
+const MOST: f64 = Retraction::MOST as f64;
+
+/// What is to be done to a segment.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Change {
+    /// A gap where there is a vessel.
+    Open(Gap),
+    /// A gap in place of all that was in it.
+    TakeOut(Removal, Gap),
+    /// No round end: in the parent for 0, in the node for 1.
+    Flatten(usize),
+}
+
+impl Change {
+    /// Makes the change, and says whether it was one.
+    pub fn apply(&self, injury: &mut Injury) -> bool {
+        match *self {
+            Self::Open(gap) => {
+                injury.open(gap);
+                true
+            }
+            Self::TakeOut(removal, gap) => injury.take_out(removal, gap),
+            Self::Flatten(side) => injury.flatten(side),
+        }
+    }
+}
+
+/// A stretch of one segment on an end's way.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    node: NodeId,
+    /// Share at which the way comes into the segment.
+    start: f32,
+    /// Length of the segment.
+    length: f64,
+    /// Length of the stretch.
+    available: f64,
+}
+
+/// All that a blade does to a tree, in the making.
+pub(super) struct Plan<'a, S> {
+    tree: &'a VesselTree,
+    injuries: &'a BTreeMap<u32, Injury>,
+    /// In the order of the nodes, then from parent to node.
+    hits: &'a [Severed],
+    search: S,
+    retraction: Retraction,
+    /// The way of the end that came to rest last.
+    way: Vec<Stretch>,
+    /// Number of places at which a vessel is severed.
+    pub severed: usize,
+    /// By node, in any order.
+    pub changes: Vec<(u32, Change)>,
+}
+
+impl<'a, S: SegmentSearch> Plan<'a, S> {
+    pub fn new(
+        tree: &'a VesselTree,
+        injuries: &'a BTreeMap<u32, Injury>,
+        hits: &'a [Severed],
+        search: S,
+        retraction: Retraction,
+    ) -> Self {
+        Self { tree, injuries, hits, search, retraction, way: Vec::new(), severed: 0, changes: Vec::new() }
+    }
+
+    /// Severs the vessel at each place where there is one. `new_end` gives the numbers of ends, by the segment on which
+    /// they come to rest.
+    pub fn cut(&mut self, mut new_end: impl FnMut(NodeId) -> u32) {
+        for &Severed { node, from: share, .. } in self.hits {
+            if self.injury(node).gap_at(share).is_none() {
+                let (from, proximal) = self.draw_back(node, share, EndSide::Proximal, &mut new_end);
+                let (to, distal) = self.draw_back(node, share, EndSide::Distal, &mut new_end);
+                self.changes.push((node.0, Change::Open(Gap { from, to, proximal, distal })));
+                self.severed += 1;
+            }
+        }
+    }
+
+    /// Takes out the stretch of each place, and severs the vessel where it goes on.
+    pub fn take_out(&mut self, mut new_end: impl FnMut(NodeId) -> u32) {
+        for &Severed { node, from, to, enters, leaves } in self.hits {
+            let removal = Removal { from, to, enters, leaves };
+            // Where a side lies in a gap, that becomes longer, and keeps its end.
+            let (from, proximal) = match self.injury(node).gap_at(from) {
+                _ if !enters => (0.0, None),
+                Some(gap) => (gap.from, gap.proximal),
+                None => {
+                    self.severed += 1;
+                    self.draw_back(node, from, EndSide::Proximal, &mut new_end)
+                }
+            };
+            let (to, distal) = match self.injury(node).gap_at(to) {
+                _ if !leaves => (1.0, None),
+                Some(gap) => (gap.to, gap.distal),
+                None => {
+                    self.severed += 1;
+                    self.draw_back(node, to, EndSide::Distal, &mut new_end)
+                }
+            };
+            self.changes.push((node.0, Change::TakeOut(removal, Gap { from, to, proximal, distal })));
+        }
+    }
+
+    /// Draws an end back from where it was severed, through all segments but the first: how far the gap reaches in that,
+    /// and the end, if it is there.
+    fn draw_back(
+        &mut self,
+        node: NodeId,
+        share: f32,
+        side: EndSide,
+        new_end: &mut impl FnMut(NodeId) -> u32,
+    ) -> (f32, Option<Tip>) {
+        let rest = self.rest(node, share, side);
+        let injury = self.injury(node);
+        let is_proximal = side == EndSide::Proximal;
+        let sealed = if is_proximal { injury.is_sealed_below(share) } else { injury.is_sealed_above(share) };
+        let tip = Some(Tip { end: new_end(rest.node), sealed });
+        self.flatten_around(rest, side);
+        if rest.node == node {
+            return (rest.along, tip);
+        }
+        for stretch in &self.way[1..] {
+            let gap = match side {
+                _ if stretch.node != rest.node => Gap::WHOLE,
+                EndSide::Proximal => Gap { from: rest.along, proximal: tip, ..Gap::WHOLE },
+                EndSide::Distal => Gap { to: rest.along, distal: tip, ..Gap::WHOLE },
+            };
+            self.changes.push((stretch.node.0, Change::Open(gap)));
+        }
+        (if is_proximal { 0.0 } else { 1.0 }, None)
+    }
+
+    /// Where an end comes to rest; `way` then leads there. One that would lie in a node that it passes lies behind it.
+    fn rest(&mut self, node: NodeId, share: f32, side: EndSide) -> Place {
+        let radius = self.tree.radii()[node.index()];
+        let wish = f64::from(self.retraction.radii) * f64::from(radius) + f64::from(self.retraction.length);
+        let run = self.trace(node, share, side, wish / MOST);
+        let mut left = wish.min(MOST * run);
+        let (mut at, last) = (0, self.way.len() - 1);
+        while at < last && left >= self.way[at].available {
+            left -= self.way[at].available;
+            at += 1;
+        }
+        self.way.truncate(at + 1);
+        let Stretch { node, start, length, .. } = self.way[at];
+        let moved = if length > 0.0 { left / length } else { 0.0 };
+        let along = f64::from(start) + if side == EndSide::Proximal { -moved } else { moved };
+        Place::new(node, along.clamp(0.0, 1.0) as f32)
+    }
+
+    /// Follows the vessel from a place, away from where it was severed, until `enough` lies behind or something holds an
+    /// end. Returns the length of that `way`.
+    fn trace(&mut self, node: NodeId, share: f32, side: EndSide, enough: f64) -> f64 {
+        let [near, far] = if side == EndSide::Proximal { [1.0, 0.0] } else { [0.0, 1.0] };
+        self.way.clear();
+        let (mut node, mut from, mut run) = (node, Some(share), 0.0);
+        loop {
+            let hold = self.hold(node, from, side);
+            let (start, end) = (from.unwrap_or(near), hold.unwrap_or(far));
+            let length = self.length(node);
+            let available = f64::from((end - start).abs()) * length;
+            self.way.push(Stretch { node, start, length, available });
+            run += available;
+            if hold.is_some() || run >= enough {
+                return run;
+            }
+            let Some(next) = self.next(node, side) else { return run };
+            (node, from) = (next, None);
+        }
+    }
+
+    /// What holds an end within a segment: its wounds, or another place of the blade. `from` is where it was severed;
+    /// `None` where it came from the next segment.
+    fn hold(&self, node: NodeId, from: Option<f32>, side: EndSide) -> Option<f32> {
+        let injury = self.injury(node);
+        let first = self.hits.partition_point(|hit| hit.node < node);
+        let hits = self.hits[first..].iter().take_while(|hit| hit.node == node);
+        if side == EndSide::Proximal {
+            let others = hits.map(|hit| hit.to).filter(|&hit| from.is_none_or(|from| hit < from));
+            others.chain(injury.hold_below(from.unwrap_or(1.0))).reduce(f32::max)
+        } else {
+            let others = hits.map(|hit| hit.from).filter(|&hit| from.is_none_or(|from| hit > from));
+            others.chain(injury.hold_above(from.unwrap_or(f32::NEG_INFINITY))).reduce(f32::min)
+        }
+    }
+
+    /// The segment in which the vessel goes on, where that is the only one.
+    fn next(&mut self, node: NodeId, side: EndSide) -> Option<NodeId> {
+        let (joint, next) = match side {
+            EndSide::Proximal => {
+                let parent = self.tree.parent(node)?;
+                self.tree.parent(parent)?;
+                (parent, Some(parent))
+            }
+            EndSide::Distal => (node, None),
+        };
+        let (mut child, mut several) = (None, false);
+        self.children(joint, |other| several |= *child.get_or_insert(other) != other);
+        if several { None } else { next.or(child) }
+    }
+
+    /// Draws whole segments flat whose round ends would reach past a tip, or into its lumen.
+    fn flatten_around(&mut self, tip: Place, side: EndSide) {
+        let lumen = f64::from(LUMEN_DEPTH * self.tree.radii()[tip.node.index()]);
+        let length = self.length(tip.node);
+        match side {
+            EndSide::Proximal => self.flatten_above(tip.node, f64::from(tip.along) * length, lumen),
+            EndSide::Distal => self.flatten_below(tip.node, f64::from(1.0 - tip.along) * length, lumen),
+        }
+    }
+
+    /// Those towards the root from a tip, which lies `distance` behind the beginning of its segment.
+    fn flatten_above(&mut self, mut child: NodeId, mut distance: f64, lumen: f64) {
+        let tree = self.tree;
+        while let Some(node) = tree.parent(child).filter(|&node| tree.parent(node).is_some()) {
+            let dome = f64::from(END_DOME * tree.radii()[node.index()]);
+            if distance >= dome + lumen || !self.is_continued(node, child) {
+                return;
+            }
+            self.changes.push((node.0, Change::Flatten(1)));
+            if !self.injury(node).gaps().is_empty() {
+                return;
+            }
+            distance += self.length(node);
+            child = node;
+        }
+    }
+
+    /// Whether a child goes on with the whole width of a segment, so that the end of that is not seen.
+    fn is_continued(&mut self, node: NodeId, child: NodeId) -> bool {
+        let radii = self.tree.radii();
+        let radius = radii[node.index()];
+        let mut is_alone = radius <= MAX_FLARE * radii[child.index()];
+        self.children(node, |other| is_alone &= other == child || radii[other.index()] <= THIN_BRANCH * radius);
+        is_alone
+    }
+
+    /// Those towards the tips, of which each begins within the round end of another: from the end of a segment, to
+    /// where it is `distance` from the tip.
+    fn flatten_below(&mut self, node: NodeId, distance: f64, lumen: f64) {
+        let radii = self.tree.radii();
+        let mut ends = vec![(node, distance)];
+        while let Some((node, distance)) = ends.pop() {
+            let mut near = Vec::new();
+            self.children(node, |child| {
+                let start_radius = radii[node.index()].min(MAX_FLARE * radii[child.index()]);
+                if distance < f64::from(START_DOME * start_radius) + lumen {
+                    near.push(child);
+                }
+            });
+            near.sort_unstable();
+            near.dedup();
+            for child in near {
+                self.changes.push((child.0, Change::Flatten(0)));
+                if self.injury(child).gaps().is_empty() {
+                    ends.push((child, distance + self.length(child)));
+                }
+            }
+        }
+    }
+
+    /// The segments that leave a node; some perhaps more than once.
+    fn children(&mut self, node: NodeId, mut visit: impl FnMut(NodeId)) {
+        let parents = self.tree.parents();
+        self.search.leaving(self.tree, node, &mut |child| {
+            if parents.get(child.index()) == Some(&node.0) {
+                visit(child);
+            }
+        });
+    }
+
+    fn injury(&self, node: NodeId) -> &'a Injury {
+        self.injuries.get(&node.0).unwrap_or(&NO_INJURY)
+    }
+
+    /// In f64, since a segment may be too short for the square of its length in f32.
+    fn length(&self, node: NodeId) -> f64 {
+        segment(self.tree, node).map_or(0.0, |[start, end]| start.as_dvec3().distance(end.as_dvec3()))
+    }
+}
