@@ -151,11 +151,10 @@ fn a_vessel_of_many_segments_is_cut_as_its_length_alone() {
                     line.take_out([x - half, x + half], wish);
                 }
                 1 => {
-                    if let Some((place, distance)) = wounds.nearest_place(&tree, all(&tree), Vec3::X * x, 0.0) {
-                        if (distance + RADIUS).abs() < 1e-6 {
-                            wounds.clamp(place, &tree).expect("there is a vessel");
-                            line.clamps.push(x);
-                        }
+                    let near = wounds.nearest_place(&tree, all(&tree), Vec3::X * x, 0.0);
+                    if let Some((place, _)) = near.filter(|(_, distance)| (distance + RADIUS).abs() < 1e-6) {
+                        wounds.clamp(place, &tree).expect("there is a vessel");
+                        line.clamps.push(x);
                     }
                 }
                 _ => {

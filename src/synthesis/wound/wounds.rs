@@ -106,9 +106,9 @@ impl Wounds {
             ends.len() as u32 - 1
         };
         if blade.is_volume() {
-            plan.take_out(&mut new_end)
+            plan.take_out(&mut new_end);
         } else {
-            plan.cut(&mut new_end)
+            plan.cut(&mut new_end);
         }
         let Plan { severed: places, mut changes, .. } = plan;
         self.hits = hits;
