@@ -192,7 +192,9 @@ fn operate(
         draw_scalpel(vessels.in_stroke(stroke), [before, now].map(|at| site.scalpel(share(at), &surface)))?;
     }
     if is_due(CLAMP) {
-        patient.feeds_most().map(|(entity, place)| vessels.clamp_at(entity, place));
+        if let Some((artery, place)) = patient.feeds_most() {
+            vessels.clamp_at(artery, place);
+        }
         looks.iter_mut().for_each(|mut look| look.coloring = SegmentColoring::Supply);
     }
     if is_due(CAUTERY) {
