@@ -24,6 +24,7 @@ pub const MAX_FLARE: f32 = 1.3;
 /// One vessel segment: a cone with round ends, in tissue lengths.
 ///
 /// An end at which the vessel was cut is open: flat, with a view into the lumen. Its radius is stored as a negative number.
+/// So is one inside a vessel that was cut nearby, where a round end would be seen in the gap.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SegmentInstance {
