@@ -168,11 +168,15 @@ impl Film {
         }
     }
 
-    /// The mesh of the film as it is now.
-    fn draw(&mut self, surface: &Surface) -> Mesh {
+    /// The mesh of the film as it is now; `None` where there is none to be seen, since a mesh without triangles can't be
+    /// drawn.
+    fn draw(&mut self, surface: &Surface) -> Option<Mesh> {
         // Two rings around what is wet, over which the film fades.
         let mut cells: Vec<u32> =
             self.wet.iter().copied().filter(|&cell| self.depths[cell as usize] > 1.0e-6).collect();
+        if cells.is_empty() {
+            return None;
+        }
         cells.iter().enumerate().for_each(|(number, &cell)| self.numbers[cell as usize] = number as u32);
         let mut inner = self.surround(&mut cells, 0);
         inner = self.surround(&mut cells, inner);
@@ -195,11 +199,12 @@ impl Film {
         let positions: Vec<Vec3> = cells.iter().zip(&depths).map(top).collect();
         let normals = self.normals(&cells, &positions, &indices);
         let colors: Vec<[f32; 4]> = depths.iter().copied().map(color).collect();
-        Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        let mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
             .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
             .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
             .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colors)
-            .with_inserted_indices(Indices::U32(indices))
+            .with_inserted_indices(Indices::U32(indices));
+        Some(mesh)
     }
 
     /// Adds the neighbours of all cells from a number on that are not among them, and says how many there were.
@@ -259,10 +264,7 @@ pub fn show_film(
     materials: Option<ResMut<Assets<StandardMaterial>>>,
 ) {
     let (Some(mut film), Some(surface), Some(mut materials)) = (film, surface, materials) else { return };
-    if film.wet.is_empty() {
-        return;
-    }
-    let mesh = film.draw(&surface);
+    let Some(mesh) = film.draw(&surface) else { return };
     match &film.mesh {
         Some(handle) => {
             if let Some(mut drawn) = meshes.get_mut(handle.id()) {
