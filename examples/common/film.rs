@@ -22,6 +22,8 @@ const STEP: f32 = 0.008;
 const STICKS: f32 = 0.000_12;
 const STANDS: f32 = 0.000_55;
 const DRIPS: f32 = 0.0022;
+/// Share of what hangs around a drop that it takes along.
+const GATHERED: f32 = 0.7;
 /// Speed of a thin film on a slope, in metres a second for the square of its depth in metres: weight over three times the
 /// viscosity; and the fastest that it runs.
 const MOBILITY: f32 = 1060.0 * 9.81 / (3.0 * 0.0035);
@@ -116,15 +118,28 @@ impl Film {
                 self.depths[cell] += std::mem::take(&mut self.changes[cell]);
             }
         }
-        for &cell in &self.wet {
-            let (depth, normal) = (self.depths[cell as usize], self.skin.normals[cell as usize]);
-            if depth > DRIPS && normal.y < -0.25 {
-                let falls = depth - 2.0 * STICKS;
-                self.depths[cell as usize] -= falls;
-                let volume = Volume::from_cubic_metres(f64::from(falls * self.area(cell)));
-                drip(self.skin.positions[cell as usize], normal, volume);
+        for index in 0..self.wet.len() {
+            let cell = self.wet[index];
+            if self.depths[cell as usize] > DRIPS && self.skin.normals[cell as usize].y < -0.25 {
+                let volume = self.gather(cell);
+                drip(self.skin.positions[cell as usize], self.skin.normals[cell as usize], volume);
             }
         }
+    }
+
+    /// Takes what becomes a drop: all that hangs from a cell, and most of what hangs beside it.
+    fn gather(&mut self, cell: u32) -> Volume {
+        let mut around = std::mem::take(&mut self.around);
+        around.clear();
+        around.extend(self.skin.neighbours(cell));
+        let mut cubic_metres = 0.0;
+        for (share, from) in std::iter::once((1.0, cell)).chain(around.iter().map(|&beside| (GATHERED, beside))) {
+            let falls = share * (self.depths[from as usize] - 2.0 * STICKS).max(0.0);
+            self.depths[from as usize] -= falls;
+            cubic_metres += falls * self.area(from);
+        }
+        self.around = around;
+        Volume::from_cubic_metres(f64::from(cubic_metres))
     }
 
     /// Lets what stands on a cell run down, and spread to neighbours with less.

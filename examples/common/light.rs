@@ -43,15 +43,17 @@ struct RoomLight(f32);
 #[derive(Component)]
 pub struct HeadLight;
 
+/// From where the warm key light comes: the upper left.
+pub const KEY_LIGHT: Vec3 = Vec3::new(-1.4, 2.2, 2.2);
 const SKY: f32 = 620.0;
 const SKY_INSIDE: f32 = 60.0;
 const HEAD_LIGHT: f32 = 260.0;
 
 fn spawn_lights(mut commands: Commands) {
-    // A warm key light from the upper left, and a cool one from behind that draws the outline.
+    // A key light, and a cool one from behind that draws the outline.
     let cascades = CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 4.0, ..default() }.build();
     let key = DirectionalLight { color: Color::srgb(1.0, 0.96, 0.9), shadow_maps_enabled: true, ..default() };
-    let key_place = Transform::from_xyz(-1.4, 2.2, 2.2).looking_at(Vec3::ZERO, Vec3::Y);
+    let key_place = Transform::from_translation(KEY_LIGHT).looking_at(Vec3::ZERO, Vec3::Y);
     commands.spawn((key, key_place, cascades, RoomLight(8_000.0)));
     let edge = DirectionalLight { color: Color::srgb(0.72, 0.84, 1.0), ..default() };
     commands.spawn((edge, Transform::from_xyz(2.0, 0.6, -1.6).looking_at(Vec3::ZERO, Vec3::Y), RoomLight(4_000.0)));

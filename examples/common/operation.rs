@@ -2,6 +2,7 @@
 
 use crate::{
     common::{
+        light::KEY_LIGHT,
         photo::{MoreShots, Shot, Shots},
         studio::{StudioArgs, View},
     },
@@ -41,7 +42,7 @@ const CUT_LENGTH: f32 = 0.11;
 /// How far above the end that bleeds most the clamp goes on, in world units, and how far at least the root is from the cut.
 const CLAMP_ABOVE: f32 = 0.03;
 const ROOT_ABOVE: f32 = 0.06;
-/// Least cosine between the normal of the skin that is cut and the direction that it is seen from.
+/// Least cosine between the normal of the skin that is cut and the directions that it is seen and lit from.
 const FACING: f32 = 0.5;
 const CLAMP: f64 = 5.0;
 const CAUTERY: f64 = 8.0;
@@ -90,7 +91,7 @@ struct Site {
 }
 
 impl Site {
-    /// The widest artery in view, on skin that faces the viewer, with some vessel between it and its root.
+    /// The widest artery in view and in the light, with some vessel between it and its root.
     fn find(vessels: &Vessels, place: &GlobalTransform, surface: &Surface) -> Option<Self> {
         let tree = vessels.tree();
         let at = |node: NodeId| place.transform_point(tree.positions()[node.index()]);
@@ -98,8 +99,11 @@ impl Site {
         let mut nodes: Vec<NodeId> = tree.segments().map(|(node, _)| NodeId(node as u32)).collect();
         nodes.sort_by(|a, b| tree.radii()[b.index()].total_cmp(&tree.radii()[a.index()]));
         let is_far = |node: NodeId| above(tree, node, |other| at(other).distance(at(node)) > ROOT_ABOVE).is_some();
-        let faces = |[at, normal]: &[Vec3; 2]| (surface.eye - at).normalize_or_zero().dot(*normal) > FACING;
-        let site = |node: NodeId| surface.nearest(at(node)).map(Into::into).filter(faces);
+        let faces = |normal: Vec3, other: Vec3| other.normalize_or_zero().dot(normal) > FACING;
+        let is_lit = |at: Vec3| surface.hit(at + KEY_LIGHT, at + 0.01 * KEY_LIGHT).is_none();
+        let shows =
+            |&[at, normal]: &[Vec3; 2]| faces(normal, surface.eye - at) && faces(normal, KEY_LIGHT) && is_lit(at);
+        let site = |node: NodeId| surface.nearest(at(node)).map(Into::into).filter(shows);
         let seen = nodes.into_iter().filter(|&node| is_far(node) && is_seen(node));
         let (node, [wound, normal]) = seen.filter_map(|node| Some((node, site(node)?))).next()?;
         let along = at(node) - at(tree.parent(node)?);
