@@ -53,6 +53,7 @@ mod alias;
 mod attraction;
 pub mod binding;
 pub mod colonization;
+mod curve;
 mod draws;
 pub mod haemodynamics;
 pub mod instances;

@@ -16,7 +16,8 @@ use super::{
     segment_run::{Run, box_of, curve_through},
 };
 use crate::synthesis::{
-    packed_boxes::{Curve, Pack, Ray},
+    curve::Curve,
+    packed_boxes::{Pack, Ray},
     tree::{NodeId, Place, VesselTree},
 };
 use bevy_math::Vec3;

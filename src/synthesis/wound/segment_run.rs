@@ -5,7 +5,8 @@
 
 use super::round_cone::box_around;
 use crate::synthesis::{
-    packed_boxes::{Curve, PackedBoxes},
+    curve::Curve,
+    packed_boxes::PackedBoxes,
     tree::{NO_PARENT, VesselTree},
 };
 use bevy_math::Vec3;
