@@ -46,6 +46,7 @@ mod network;
 mod open_ends;
 mod quotient;
 mod settings;
+mod side;
 mod skeleton;
 mod solution;
 mod sweeps;

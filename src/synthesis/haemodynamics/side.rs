@@ -1,0 +1,152 @@
+//! One of the two networks of a circulation, as the links between them see it.
+
+use super::{
+    Network,
+    network::{SOURCE, node_slot},
+    quotient::Quotient,
+};
+use crate::synthesis::tree::NodeId;
+
+/// The nodes of one network that links end in, and its answer to currents into them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Side {
+    /// Slots of the nodes, in rising order.
+    pub slots: Vec<u32>,
+    /// For every link, the place of its node in `slots`.
+    pub of_links: Vec<u32>,
+    pub quotient: Quotient,
+    /// The joint of each slot.
+    joints: Vec<u32>,
+    /// The revision of the network that was traced.
+    traced: Option<u64>,
+    /// Pressures of the slots as of the last solution.
+    pub pressures: Vec<f64>,
+}
+
+impl Side {
+    pub fn new(nodes: impl Iterator<Item = NodeId> + Clone) -> Self {
+        let mut slots: Vec<u32> = nodes.clone().map(|node| node_slot(node.index()) as u32).collect();
+        slots.sort_unstable();
+        slots.dedup();
+        let place = |node: NodeId| slots.partition_point(|&slot| slot < node_slot(node.index()) as u32) as u32;
+        let of_links = nodes.map(place).collect();
+        Self { slots, of_links, ..Self::default() }
+    }
+
+    /// Traces the network where it has changed, and takes the pressures of its last solution.
+    pub fn prepare(&mut self, network: &mut Network) {
+        if self.traced != Some(network.revision) {
+            self.quotient.trace(network, &self.slots);
+            self.joints = self.slots.iter().map(|&slot| self.quotient.joint_at(slot)).collect();
+            self.traced = Some(network.revision);
+        }
+        self.pressures.clear();
+        self.pressures.extend(self.slots.iter().map(|&slot| network.slots[slot as usize].pressure));
+    }
+
+    /// Pressures at the linked nodes that currents into them cause, all else being at pressure 0: T⁻¹.
+    pub fn respond(&mut self, currents: &[f64], pressures: &mut [f64]) {
+        self.quotient.begin();
+        self.give(currents);
+        self.quotient.solve(0.0);
+        for (pressure, &joint) in pressures.iter_mut().zip(&self.joints) {
+            *pressure = self.quotient.pressure(joint);
+        }
+    }
+
+    /// Pressures at the linked nodes with all that drives the network: its roots, its open ends as they are linearised,
+    /// and what the links bring.
+    pub fn settle(&mut self, network: &Network, currents: &[f64]) {
+        self.quotient.begin();
+        self.give(currents);
+        for end in network.ends.all() {
+            self.quotient.give(self.quotient.joint_at(end.attached), end.stump.s);
+        }
+        self.quotient.solve(network.source);
+        for (pressure, &joint) in self.pressures.iter_mut().zip(&self.joints) {
+            *pressure = self.quotient.pressure(joint);
+        }
+    }
+
+    fn give(&mut self, currents: &[f64]) {
+        for (&joint, &current) in self.joints.iter().zip(currents) {
+            self.quotient.give(joint, current);
+        }
+    }
+
+    /// What the links bring to this side from pressures on the other: E.
+    pub fn carry(&self, other: &Self, conductance: f64, pressures: &[f64], currents: &mut [f64]) {
+        currents.fill(0.0);
+        for (&here, &there) in self.of_links.iter().zip(&other.of_links) {
+            currents[here as usize] += conductance * pressures[there as usize];
+        }
+    }
+
+    /// Forgets what links bring to roots, whose pressure is given: there is nothing to balance.
+    pub fn excuse_roots(&self, network: &Network, currents: &mut [f64]) {
+        for (current, &slot) in currents.iter_mut().zip(&self.slots) {
+            if network.links[slot as usize].upstream == SOURCE {
+                *current = 0.0;
+            }
+        }
+    }
+
+    /// Sets what the links bring, and solves the network with its ends as they are loaded.
+    pub fn drive(&self, network: &mut Network, currents: &[f64]) {
+        for (&slot, &current) in self.slots.iter().zip(currents) {
+            network.beds[slot as usize].s = current;
+            network.shunts[slot as usize] = network.beds[slot as usize];
+        }
+        network.load_stumps();
+        network.sum_all();
+        network.spread_pressures();
+        // What changes from here on makes a later solution of this network alone begin anew.
+        network.sums_stale = true;
+        network.ends.is_untraced = true;
+    }
+}
+
+impl Network {
+    /// Joins nodes to another network, in place of those that were: each as often as it is named. All are there.
+    pub(super) fn set_links(&mut self, nodes: impl Iterator<Item = NodeId>) {
+        self.link_counts.clear();
+        self.link_counts.resize(self.len(), 0);
+        for node in nodes {
+            self.link_counts[node.index()] += 1;
+        }
+        self.set_beds();
+    }
+
+    /// Sets what all nodes drain into.
+    pub(super) fn set_beds(&mut self) {
+        for node in 0..self.len() {
+            self.set_bed(node);
+        }
+        self.sums_stale = true;
+        self.revision += 1;
+        self.ends.is_untraced = true;
+    }
+
+    /// Pressure outside above the bed's.
+    pub(super) fn ambient(&self) -> f64 {
+        self.settings.ambient.pascals() - self.bed
+    }
+
+    /// What the ends draw by their tangents, by pressures above the bed's.
+    pub(super) fn linearise_ends(&mut self) {
+        self.ends.linearise();
+        self.ends.count_from(-self.ambient());
+    }
+
+    pub(super) fn accept_ends(&mut self, quotient: &Quotient, damped: bool) -> f64 {
+        let ambient = self.ambient();
+        self.ends.count_from(ambient);
+        let rounding = 1e-11 * self.source.abs().max(ambient.abs());
+        self.ends.accept(|end| quotient.pressure(quotient.joint_at(end.attached)) - ambient, rounding, damped)
+    }
+
+    pub(super) fn finish_ends(&mut self, quotient: &Quotient) {
+        let ambient = self.ambient();
+        self.ends.finish(|end| quotient.pressure(quotient.joint_at(end.attached)) - ambient, ambient, self.bed);
+    }
+}
