@@ -98,6 +98,7 @@ impl PointGrid {
     /// All of them are looked at whatever is found: where a search may end at any time the processor guesses wrong so often
     /// that this takes longer.
     fn any_in_eight(&self, low: UVec3, high: UVec3, center: Vec3, limit: f32) -> bool {
+        let is_one_layer = low.z == high.z;
         let [low, high] = [low, high].map(|cell| {
             let (brick, inner) = (cell / SIDE, cell % SIDE);
             let place = UVec3::new(brick.x, brick.y * self.row, brick.z * self.layer);
@@ -109,7 +110,7 @@ impl PointGrid {
         };
         let [a, b, c, d] =
             [head(&low, &low, &low), head(&high, &low, &low), head(&low, &high, &low), head(&high, &high, &low)];
-        if low[0].z + low[1].z == high[0].z + high[1].z {
+        if is_one_layer {
             return self.chains_reach([a, b, c, d], center, limit);
         }
         let [e, f, g, h] =

@@ -85,3 +85,23 @@ fn extreme_cells_and_queries_neither_overflow_nor_hang() {
     let grid = PointGrid::new(&flat, 0.1);
     assert!(!grid.any_within(Vec3::ZERO, 1.0));
 }
+
+#[test]
+fn answers_equal_brute_force_in_boxes_of_any_proportions() {
+    for x in 1..=9 {
+        for (y, z) in [(1, 1), (2, 7), (5, 3), (8, 2), (9, 9), (16, 4), (24, 2)] {
+            let size = Vec3::new(x as f32, y as f32, z as f32);
+            let mut grid = PointGrid::new(&Aabb3d { min: Vec3::ZERO.into(), max: size.into() }, 0.26);
+            let mut rng = Stream::Roots.rng(u64::from(x as u32 * 100 + y as u32));
+            let mut place = || size * Vec3::from_array(std::array::from_fn(|_| rng.random_range(-0.02..1.02)));
+            let points: Vec<Vec3> = (0..40 * x * y * z / 9).map(|_| place()).collect();
+            points.iter().for_each(|&point| _ = grid.push(point));
+            for number in 0..200 {
+                let center = place();
+                let radius = [0.05, 0.12, 0.129][number % 3];
+                let expected = points.iter().any(|point| point.distance_squared(center) <= radius * radius);
+                assert_eq!(grid.any_within(center, radius), expected, "{size}: {center} {radius}");
+            }
+        }
+    }
+}
