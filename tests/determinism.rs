@@ -2,13 +2,18 @@
 
 mod common;
 
+use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::{ColonizationSettings, Growth},
-    roots::Roots,
+    mesh::TriangleMesh,
+    organ::ColonSettings,
+    preset::PresetName,
+    roots::{RootPlacement, Roots},
+    tissue::{Ball, Disc, MeshSurface, Tissue},
     tree::{System, hash_trees},
 };
 use common::{Case, tissues};
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 /// Many samples a step, so that threads share the work where they can, and few steps.
 fn settings() -> ColonizationSettings {
@@ -154,4 +159,31 @@ fn seeds_differ() {
         hashes.dedup();
         assert_eq!(hashes.len(), runs, "{}: two seeds grew the same", case.name);
     }
+}
+
+/// What the built-in presets grow, as of this version. Whoever changes a hash says so in the changelog: the organs of all
+/// seeds change with it.
+#[test]
+fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
+    let colon = ColonSettings::default().generate()?;
+    let outer = colon.mesh.part(colon.outer.clone());
+    let outer = TriangleMesh::new(outer.positions, outer.triangles, None)?;
+    let beside = |sites: &[Vec3]| RootPlacement::Nearest(sites.to_vec());
+    let colon_roots = Some([beside(&colon.roots.arterial), beside(&colon.roots.venous)]);
+    let cases: [(PresetName, Arc<dyn Tissue>, _, u64); 4] = [
+        (PresetName::ReferenceDisc, Arc::new(Disc::flat(0.5)?), None, 0x42fc_d56c_82cf_1345),
+        (PresetName::ReferenceBall, Arc::new(Ball::new(Vec3::ZERO, 0.5)?), None, 0x2b2b_c0bc_618a_8157),
+        (PresetName::Paper, Arc::new(Disc::flat(0.5)?), None, 0x96bc_9ec1_951a_5766),
+        (PresetName::Colon, Arc::new(MeshSurface::new(outer)?), colon_roots, 0xd382_37cf_3d72_036a),
+    ];
+    for (name, tissue, roots, expected) in cases {
+        let preset = name.load();
+        let [arterial, venous] = roots.unwrap_or([preset.arterial_roots, preset.venous_roots]);
+        let roots = Roots { arterial, venous, given: [None, None] };
+        let settings = if preset.fit { preset.settings.fit(tissue.extent()) } else { preset.settings };
+        let mut growth = Growth::new(tissue, settings, &roots, 0)?;
+        growth.run();
+        assert_eq!(hash(&growth), expected, "{name}: {:#018x}", hash(&growth));
+    }
+    Ok(())
 }
