@@ -34,8 +34,11 @@ mod threads {
         };
         let lead = || {
             work();
-            let is_done = |_: &usize| unfinished.load(Ordering::Acquire) == 0;
-            (0..PATIENCE).take_while(|tries| !is_done(tries)).for_each(|_| std::hint::spin_loop());
+            let mut tries = 0;
+            while unfinished.load(Ordering::Acquire) > 0 && tries < PATIENCE {
+                tries += 1;
+                std::hint::spin_loop();
+            }
         };
         rayon::join(lead, || on_threads(count.min(rayon::current_num_threads()) - 1, &work));
     }

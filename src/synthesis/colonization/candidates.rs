@@ -24,6 +24,7 @@ const WORTH_SORTING: usize = 8192;
 pub(crate) struct Draws {
     /// The random stream, at its beginning.
     rng: VesselRng,
+    /// As many as any step needed; those beyond what the present one needs are empty.
     blocks: Vec<Vec<Vec3>>,
     /// The step that the blocks are of, 0 for none, and whether its candidates were chosen by what was vacant.
     drawn: (u32, bool),
@@ -47,9 +48,14 @@ impl Draws {
             return;
         }
         self.drawn = (step, vacancy.is_some());
-        self.blocks.resize_with(count.div_ceil(BLOCK) as usize, Vec::new);
+        let needed = count.div_ceil(BLOCK) as usize;
+        if self.blocks.len() < needed {
+            self.blocks.resize_with(needed, Vec::new);
+        }
+        let (blocks, beyond) = self.blocks.split_at_mut(needed);
+        beyond.iter_mut().for_each(Vec::clear);
         let rng = &self.rng;
-        parallel::for_each(&mut self.blocks, |index, block| {
+        parallel::for_each(blocks, |index, block| {
             let mut rng = rng.clone();
             rng.set_word_pos((u128::from(step) << BLOCKS | index as u128) << STRETCH);
             block.clear();

@@ -71,5 +71,6 @@ impl Lengths {
     }
 }
 
-/// Side of a cell as a share of the distance that is asked for most.
+/// Side of a cell in distances that are asked for most: a little more than two, so that a ball of that radius meets no more
+/// than two cells along each axis.
 const CELL: f32 = 2.01;

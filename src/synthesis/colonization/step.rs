@@ -17,9 +17,9 @@ pub(super) struct Step<'a> {
     pub number: u32,
 }
 
-impl Step<'_> {
-    /// Draws candidates, and finds out which of them are in tissue that the arteries supply. Of tissue that is cut into
-    /// pieces they are drawn where it is `vacant`.
+impl<'a> Step<'a> {
+    /// Draws candidates, and finds out which of them are in tissue that the arteries supply. Where it is known what of the
+    /// tissue is vacant, they are drawn there.
     pub fn choose_candidates(
         self,
         draws: &mut Draws,
@@ -75,7 +75,7 @@ impl Step<'_> {
     }
 
     /// Where new nodes may be put.
-    pub fn ground(&self) -> Ground<'_> {
+    pub fn ground(self) -> Ground<'a> {
         let tissue = self.tissue.at_step(self.number);
         let surface = matches!(tissue.extent(), Extent::Area(_));
         Ground { tissue, confine: self.settings.confine, normals: self.settings.stand_off && surface }

@@ -56,7 +56,8 @@ pub struct PointGrid {
 impl PointGrid {
     /// An empty grid over a box. Cells have at least the side `cell`; more where the box would need too many.
     ///
-    /// A cell twice as large as the distances asked for is a good choice.
+    /// A cell a little more than twice as large as the distances asked for is a good choice: a ball then meets no more than two
+    /// cells along each axis.
     pub fn new(bounds: &Aabb3d, cell: f32) -> Self {
         let mut grid = Self::default();
         grid.reset(bounds, cell);

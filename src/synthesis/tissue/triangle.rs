@@ -4,9 +4,6 @@ use super::bvh::{Bounds, BoxTree};
 use crate::synthesis::mesh::TriangleMesh;
 use bevy_math::{DVec3, Vec3};
 
-/// What is left of the squared distance to a box whatever its rounding.
-const SURELY: f32 = 1.0 - 4.0 * f32::EPSILON;
-
 /// A point on a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
@@ -55,8 +52,8 @@ impl TriangleIndex {
             return None;
         }
         self.tree.nearest(point, radius * radius, |slot, best| {
-            // Most triangles of a leaf are farther off than the best one, and their boxes tell, but for their rounding.
-            if SURELY * Bounds::around(&self.corners[slot]).distance_squared(point.into()) > best {
+            // Most triangles of a leaf are farther off than the best one, and their boxes tell.
+            if Bounds::around(&self.corners[slot]).distance_squared(point.into()) > best {
                 return best;
             }
             let (weights, position) = closest_on_triangle(point, self.corners[slot]);

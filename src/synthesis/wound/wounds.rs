@@ -115,7 +115,7 @@ impl Wounds {
         // In the order in which they were planned, where a segment has several.
         changes.sort_by_key(|&(node, _)| node);
         for of_segment in changes.chunk_by(|(a, _), (b, _)| a == b) {
-            self.change(of_segment[0].0, |injury, _| {
+            self.change(of_segment[0].0, |injury| {
                 of_segment.iter().fold(false, |changed, (_, change)| change.apply(injury) || changed)
             });
         }
@@ -128,7 +128,7 @@ impl Wounds {
     /// A place that is not on a vessel of the tree, or in a gap.
     pub fn clamp(&mut self, place: Place, tree: &VesselTree) -> Result<(ClampId, WoundReport), WoundError> {
         let clamp = ClampId { index: self.clamps.len() as u32, generation: self.generation + 1 };
-        let report = self.close(place, tree, |made| ClosureKind::Clamp(made.clamp()))?;
+        let report = self.close(place, tree, ClosureKind::Clamp(clamp.index))?;
         Ok((clamp, report))
     }
 
@@ -140,7 +140,7 @@ impl Wounds {
         let record = self.clamps.get(clamp.index as usize).filter(|record| record.generation == clamp.generation);
         let &Record { node, .. } = record.ok_or(WoundError::NoSuchClamp { clamp })?;
         let action = self.begin();
-        self.change(node, |injury, _| injury.unclamp(clamp.index));
+        self.change(node, |injury| injury.unclamp(clamp.index));
         let report = self.finish(action, tree);
         if report.is_empty() { Err(WoundError::NoSuchClamp { clamp }) } else { Ok(report) }
     }
@@ -150,7 +150,7 @@ impl Wounds {
     /// # Errors
     /// A place that is not on a vessel of the tree, or in a gap.
     pub fn ligate(&mut self, place: Place, tree: &VesselTree) -> Result<WoundReport, WoundError> {
-        self.close(place, tree, |_| ClosureKind::Tie)
+        self.close(place, tree, ClosureKind::Tie)
     }
 
     /// Seals by heat, within a ball or capsule, all vessels up to a calibre, for good: intact ones over the length that
@@ -181,7 +181,7 @@ impl Wounds {
             let Some([parent, end]) = segment(tree, NodeId(node)) else { continue };
             let is_small = 2.0 * tree.radii()[node as usize] <= max_calibre;
             if let Some(range) = within(inside, parent, end).filter(|_| is_small) {
-                self.change(node, |injury, _| injury.seal(range.from as f32, range.to as f32));
+                self.change(node, |injury| injury.seal(range.from as f32, range.to as f32));
             }
         }
         Ok(self.finish(action, tree))
@@ -281,20 +281,18 @@ impl Wounds {
         EndId { index, generation: self.ends[index as usize].generation }
     }
 
-    fn close(
-        &mut self,
-        place: Place,
-        tree: &VesselTree,
-        kind: impl FnOnce(&mut Made) -> ClosureKind,
-    ) -> Result<WoundReport, WoundError> {
+    fn close(&mut self, place: Place, tree: &VesselTree, kind: ClosureKind) -> Result<WoundReport, WoundError> {
         check(place, tree)?;
         let action = self.begin();
-        self.change(place.node.0, |injury, made| {
+        let closes = self.change(place.node.0, |injury| {
             injury.has_vessel(place.along) && {
-                injury.close(place.along, kind(made));
+                injury.close(place.along, kind);
                 true
             }
         });
+        if closes && matches!(kind, ClosureKind::Clamp(_)) {
+            self.clamps.push(Record { node: place.node.0, generation: self.generation + 1 });
+        }
         let report = self.finish(action, tree);
         if report.is_empty() { Err(WoundError::NoVessel { place }) } else { Ok(report) }
     }
@@ -303,18 +301,18 @@ impl Wounds {
         Action { ends: self.ends.len(), clamps: self.clamps.len(), before: self.before.len() }
     }
 
-    /// Changes one segment. `change` says whether it did; what it makes without doing so must be nothing.
-    fn change(&mut self, node: u32, change: impl FnOnce(&mut Injury, &mut Made) -> bool) {
+    /// Changes one segment. `change` says whether it did, and so does this.
+    fn change(&mut self, node: u32, change: impl FnOnce(&mut Injury) -> bool) -> bool {
         let before = self.injuries.remove(&node).unwrap_or_default();
         let mut injury = before.clone();
-        let record = Record { node, generation: self.generation + 1 };
-        let changed = change(&mut injury, &mut Made { record, clamps: &mut self.clamps });
+        let changed = change(&mut injury);
         if !injury.is_empty() {
             self.injuries.insert(node, injury);
         }
         if changed {
             self.before.push((node, before));
         }
+        changed
     }
 
     /// Ends an action: it counts if it changed anything.
@@ -367,19 +365,6 @@ impl Wounds {
             direction: if end.side == EndSide::Proximal { along } else { -along },
             radius: tree.radii()[place.node.index()],
         })
-    }
-}
-
-/// Gives out clamps for one segment.
-struct Made<'a> {
-    record: Record,
-    clamps: &'a mut Vec<Record>,
-}
-
-impl Made<'_> {
-    fn clamp(&mut self) -> u32 {
-        self.clamps.push(self.record);
-        self.clamps.len() as u32 - 1
     }
 }
 
