@@ -262,7 +262,7 @@ impl ColonizationSettings {
     /// Fits settings made for a surface of equivalent diameter 1, as all presets are, to a tissue of any size; in a volume
     /// lengths come out [`VOLUME_FACTOR`](Self::VOLUME_FACTOR) times as long.
     ///
-    /// A 0.3 m organ and the same organ of 300 mm then grow the same vessels.
+    /// A 0.3 m organ and the same organ of 300 mm then grow alike, but for what rounding changes.
     #[must_use]
     pub fn fit(self, extent: Extent) -> Self {
         let factor = if let Extent::Volume(_) = extent { Self::VOLUME_FACTOR } else { 1.0 };
