@@ -5,14 +5,14 @@
 
 use bevy_math::{Vec3, bounding::Aabb3d};
 use bevy_vessels::synthesis::{
-    colonization::{ColonizationSettings, Growth},
-    io::read_mesh,
-    point_grid::PointGrid,
+    colonization::{Colonization, ColonizationSettings},
+    io::load_mesh,
     preset::PresetName,
-    rng::Stream,
+    random::Stream,
     roots::{RootPlacement, Roots},
+    space::point_grid::PointGrid,
     tissue::{Ball, Disc, MeshSurface, Tissue},
-    tree::System,
+    tree::VesselKind,
 };
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -52,13 +52,13 @@ impl Case {
         self
     }
 
-    fn growth(&self) -> Growth {
-        Growth::new(Arc::clone(&self.tissue), self.settings.clone(), &self.roots, 1).expect("valid settings")
+    fn growth(&self) -> Colonization {
+        Colonization::new(Arc::clone(&self.tissue), self.settings.clone(), &self.roots, 1).expect("valid settings")
     }
 }
 
-fn nodes(growth: &Growth) -> usize {
-    System::ALL.map(|system| growth.tree(system).len()).iter().sum()
+fn nodes(growth: &Colonization) -> usize {
+    VesselKind::ALL.map(|system| growth.tree(system).len()).iter().sum()
 }
 
 /// The cases that the paper's own program was measured on, each with and without a second thread.

@@ -28,9 +28,9 @@ use bevy::{
 };
 use bevy_vessels::{
     VesselPlugin,
-    plugin::{SegmentChanges, VesselAppearance, VesselSystem, Vessels, VesselsOf},
+    plugin::{SegmentChanges, VesselAppearance, Vessels, VesselsOf},
     render::SegmentChunk,
-    synthesis::tree::{NO_PARENT, System, VesselTree},
+    synthesis::tree::{NO_PARENT, VesselKind, VesselTree},
 };
 use cpu_time::ProcessTime;
 use headless::{HOW_TO_GET_PICTURES, OffscreenPlugin, OffscreenTarget, find_adapter, headless_plugins};
@@ -95,7 +95,7 @@ fn spawn_vessels(app: &mut App, segments: usize) -> Entity {
     let world = app.world_mut();
     let organ = world.spawn((Transform::default(), Visibility::default(), VesselAppearance::default())).id();
     let vessels = Vessels::from_tree(&tree, &[]);
-    world.spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(System::Arterial), vessels)).id()
+    world.spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(VesselKind::Artery), vessels)).id()
 }
 
 /// Times of a frame in milliseconds, in the order of the columns.

@@ -12,11 +12,11 @@ use bevy::{
 use bevy_vessels::{
     plugin::{
         BloodLoss, CirculationState, CuttableVessels, FollowsMesh, GrowthPlugin, OpenEnd, OrganSupply, Perfusion,
-        StrokeId, VesselIndex, VesselSystem, Vessels, VesselsOf,
+        StrokeId, VesselIndex, Vessels, VesselsOf,
     },
     synthesis::{
         haemodynamics::{Pulse, RootPressure},
-        tree::{NO_PARENT, System, VesselTree},
+        tree::{NO_PARENT, VesselKind, VesselTree},
         units::Scale,
         wound::Blade,
     },
@@ -87,7 +87,7 @@ fn organ(segments: usize) -> (App, Entity) {
     let organ = app.world_mut().spawn(organ).id();
     let vessels = Vessels::from_tree(&tree(segments), &[]);
     let vessels =
-        app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(System::Arterial), vessels)).id();
+        app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(VesselKind::Artery), vessels)).id();
     let is_ready = |world: &World| {
         let (index, tree) = (world.get::<VesselIndex>(vessels), world.get::<Vessels>(vessels));
         let is_indexed = index.zip(tree).is_some_and(|(index, tree)| index.is_complete(tree));

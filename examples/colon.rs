@@ -25,7 +25,7 @@ mod wish;
 use bevy::prelude::*;
 use bevy_vessels::{
     prelude::*,
-    synthesis::organ::{ColonSettings, OrganMesh},
+    synthesis::{mesh::ShadedMesh, organ::ColonSettings},
 };
 use clap::Parser;
 use common::{
@@ -84,7 +84,7 @@ fn next_seed(
 fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) -> Result {
     let colon = ColonSettings { seed: args.organ.seed, triangles: 120_000, ..default() }.generate()?;
     let place = to_unit_size(colon.mesh.bounds());
-    let mut spawn = |name: &'static str, mesh: OrganMesh, vessels: Option<Vasculature>| {
+    let mut spawn = |name: &'static str, mesh: ShadedMesh, vessels: Option<Vasculature>| {
         let mut organ = assets.spawn(&mut commands, mesh.into(), args.organ.tint(Color::WHITE), place);
         organ.insert(Name::new(name));
         vessels.map(|vessels| organ.insert(vessels));

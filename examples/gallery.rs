@@ -12,7 +12,7 @@ use bevy_vessels::{
     prelude::*,
     synthesis::{
         organ::{LiverSettings, Viewpoint},
-        tree::System,
+        tree::VesselKind,
     },
 };
 use clap::Parser;
@@ -33,13 +33,13 @@ struct Args {
 }
 
 /// What is on each disc: caption, preset, and the one system to show where it isn't both.
-const DISCS: [(&str, PresetName, Option<System>); 6] = [
-    ("arteries", PresetName::Paper, Some(System::Arterial)),
-    ("veins", PresetName::Paper, Some(System::Venous)),
-    ("larger kappa: wider angles", PresetName::WideAngles, Some(System::Arterial)),
-    ("larger omega: straighter", PresetName::Straight, Some(System::Arterial)),
-    ("smaller phi: symmetric", PresetName::Symmetric, Some(System::Arterial)),
-    ("larger phi: lateral branches", PresetName::Lateral, Some(System::Arterial)),
+const DISCS: [(&str, PresetName, Option<VesselKind>); 6] = [
+    ("arteries", PresetName::Paper, Some(VesselKind::Artery)),
+    ("veins", PresetName::Paper, Some(VesselKind::Vein)),
+    ("larger kappa: wider angles", PresetName::WideAngles, Some(VesselKind::Artery)),
+    ("larger omega: straighter", PresetName::Straight, Some(VesselKind::Artery)),
+    ("smaller phi: symmetric", PresetName::Symmetric, Some(VesselKind::Artery)),
+    ("larger phi: lateral branches", PresetName::Lateral, Some(VesselKind::Artery)),
 ];
 /// Where the liver is, beside the discs.
 const LIVER: Vec3 = Vec3::new(3.2, 0.0, 0.0);
@@ -57,7 +57,7 @@ fn main() -> AppExit {
 
 /// Vessels with their radii multiplied, so that they show from afar.
 fn stouter(mut wish: Vasculature, radii: f32) -> Vasculature {
-    for system in System::ALL {
+    for system in VesselKind::ALL {
         wish.settings.system_mut(system).terminal_radius *= radii;
     }
     wish
@@ -76,8 +76,8 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
             Name::new(preset.name()),
             stouter(Vasculature::new(preset).with_seed(args.seed), 2.5),
             VesselAppearance {
-                show_arterial: shows(System::Arterial),
-                show_venous: shows(System::Venous),
+                show_arterial: shows(VesselKind::Artery),
+                show_venous: shows(VesselKind::Vein),
                 ..default()
             },
         ));

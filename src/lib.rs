@@ -68,38 +68,70 @@ pub mod render;
 pub mod prelude {
     pub use crate::VesselPlugin;
     pub use crate::plugin::{
-        BloodLoss, Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, FollowsTetrahedra, GrowthAction,
-        GrowthBudget, GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd,
-        OrganVessels, Perfusion, SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystem, VesselWounds,
-        Vessels,
+        Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, FollowsTetrahedra, GrowthAction, GrowthBudget,
+        GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, Perfusion,
+        SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystems, Vessels,
     };
     pub use crate::synthesis::colonization::ColonizationSettings;
+    pub use crate::synthesis::generator::Generator;
     pub use crate::synthesis::preset::PresetName;
-    pub use crate::synthesis::roots::RootPlacement;
+    pub use crate::synthesis::roots::{RootPlacement, RootPlacements};
     pub use crate::synthesis::tissue::{TissueMode, TissueSettings};
+    pub use crate::synthesis::tree::VesselKind;
     pub use crate::synthesis::wound::Blade;
 }
 
 #[cfg(feature = "plugin")]
-use bevy::app::{App, Plugin};
+use bevy::{
+    app::{App, Plugin},
+    ecs::schedule::ScheduleLabel,
+};
 
-/// Everything that an app with vessels needs: growth, and drawing where the app draws.
+/// Everything that an app with vessels needs: growth, surgery, blood, deformation, and drawing where the app draws.
 ///
-/// Add it after `DefaultPlugins`. In an app without a renderer vessels grow all the same.
+/// Add it after `DefaultPlugins`. In an app without a renderer vessels grow all the same. Each part is a plugin of its own:
+/// an app that only grows vessels may add [`GrowthPlugin`](plugin::GrowthPlugin) alone.
 #[cfg(feature = "plugin")]
 #[derive(Clone, Debug, Default)]
 pub struct VesselPlugin {
     /// How vessels grow in this app: schedule and budget.
     pub growth: plugin::GrowthPlugin,
+    /// How vessels follow organs that are deformed.
+    pub deformation: plugin::DeformationPlugin,
+    /// How vessels are cut.
+    pub surgery: plugin::SurgeryPlugin,
+    /// How blood flows.
+    pub circulation: plugin::CirculationPlugin,
     /// How segments are drawn: how round they are.
     #[cfg(feature = "render")]
     pub segments: render::SegmentRenderPlugin,
 }
 
 #[cfg(feature = "plugin")]
+impl VesselPlugin {
+    /// Runs everything but drawing in another schedule than `Update`.
+    #[must_use]
+    pub fn in_schedule(self, schedule: impl ScheduleLabel) -> Self {
+        let schedule = schedule.intern();
+        Self {
+            growth: self.growth.in_schedule(schedule),
+            deformation: plugin::DeformationPlugin::in_schedule(schedule),
+            surgery: plugin::SurgeryPlugin::in_schedule(schedule),
+            circulation: plugin::CirculationPlugin::in_schedule(schedule),
+            ..self
+        }
+    }
+}
+
+#[cfg(feature = "plugin")]
 impl Plugin for VesselPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins(self.growth.clone());
+        app.add_plugins((
+            self.growth.clone(),
+            self.deformation.clone(),
+            self.surgery.clone(),
+            self.circulation.clone(),
+        ));
         #[cfg(feature = "render")]
         app.add_plugins(self.segments.clone());
     }

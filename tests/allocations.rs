@@ -1,11 +1,11 @@
 //! A warm step allocates nothing: a growth that is started again finds all the memory it needs.
 
 use bevy_vessels::synthesis::{
-    colonization::{ColonizationSettings, Growth},
+    colonization::{Colonization, ColonizationSettings},
     preset::PresetName,
     roots::Roots,
     tissue::{Ball, Disc, Tissue},
-    tree::System,
+    tree::VesselKind,
 };
 use std::{
     alloc::{GlobalAlloc, Layout, System as Heap},
@@ -53,16 +53,16 @@ fn assert_warm(
     roots: &Roots,
     seed: u64,
 ) -> Result<(), Box<dyn Error>> {
-    let mut growth = Growth::new(tissue, settings.clone(), roots, seed)?;
+    let mut growth = Colonization::new(tissue, settings.clone(), roots, seed)?;
     growth.run();
-    let nodes = growth.tree(System::Arterial).len();
+    let nodes = growth.tree(VesselKind::Artery).len();
     growth.restart(settings, roots, seed)?;
     while !growth.is_finished() {
         let before = COUNT.with(Cell::get);
         let step = growth.step().step;
         assert_eq!(COUNT.with(Cell::get) - before, 0, "step {step} allocated");
     }
-    assert_eq!(growth.tree(System::Arterial).len(), nodes);
+    assert_eq!(growth.tree(VesselKind::Artery).len(), nodes);
     Ok(())
 }
 

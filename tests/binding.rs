@@ -2,10 +2,10 @@
 
 use bevy_math::{Affine3A, Mat3, Quat, Vec3};
 use bevy_vessels::synthesis::{
-    binding::{Binding, BindingError, TetMesh, TetMeshError},
-    mesh::TriangleMesh,
+    binding::{Binding, BindingError},
+    mesh::{TetMesh, TetMeshError, TriangleMesh},
     organ::{ColonSettings, LiverSettings},
-    rng::{Stream, VesselRng},
+    random::{Stream, VesselRng},
     tree::{NO_PARENT, NodeId, Place, VesselTree},
 };
 use rand::RngExt;
@@ -110,7 +110,7 @@ fn bending_keeps_vessels_at_their_distance_from_the_surface() {
         let distance = 1.0e-3 * size(&mesh);
         let picked: Vec<usize> = (0..mesh.positions().len()).step_by(7).filter(|&v| normals[v] != Vec3::ZERO).collect();
         // On the triangle nearest to a point above a vertex the vertex itself may not be nearest: those are left out.
-        let index = bevy_vessels::synthesis::tissue::TriangleIndex::new(&mesh);
+        let index = bevy_vessels::synthesis::mesh::TriangleIndex::new(&mesh);
         let above = |v: usize| mesh.positions()[v] + distance * normals[v];
         let clear = |&v: &usize| {
             index.closest(above(v)).is_some_and(|found| found.position.distance(mesh.positions()[v]) < 1e-3 * distance)

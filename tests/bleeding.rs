@@ -3,12 +3,11 @@
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     haemodynamics::{
-        BedLink, BedSettings, Circulation, EndSide, FlowSettings, Interruption, Network, Outlet, Pulse, RootPressure,
-        ViscosityLaw,
+        BedSettings, Bleeding, BleedingSettings, BloodVolume, BloodVolumeSettings, Circulation, EndSide, EndState,
+        FlowSettings, Interruption, Network, Outlet, Pulse, RootPressure, ViscosityLaw,
     },
-    tree::{NO_PARENT, NodeId, VesselTree},
+    tree::{BedLink, NO_PARENT, NodeId, VesselTree},
     units::{Flow, Pressure, Resistance, Viscosity, Volume},
-    wound::{Bleeding, BleedingSettings, BloodVolume, BloodVolumeSettings, EndState},
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

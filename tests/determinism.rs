@@ -4,13 +4,13 @@ mod common;
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    colonization::{ColonizationSettings, Growth},
+    colonization::{Colonization, ColonizationSettings},
     mesh::TriangleMesh,
     organ::ColonSettings,
     preset::PresetName,
     roots::{RootPlacement, Roots},
     tissue::{Ball, Disc, MeshSurface, Tissue},
-    tree::{System, hash_trees},
+    tree::{VesselKind, hash_trees},
 };
 use common::{Case, tissues};
 use std::{collections::BTreeMap, sync::Arc};
@@ -20,27 +20,27 @@ fn settings() -> ColonizationSettings {
     ColonizationSettings { steps: 30, samples: 5000, ..ColonizationSettings::default() }
 }
 
-fn start(case: &Case, seed: u64) -> Growth {
-    Growth::new(case.tissue.clone(), settings(), &case.roots, seed).expect("settings within limits")
+fn start(case: &Case, seed: u64) -> Colonization {
+    Colonization::new(case.tissue.clone(), settings(), &case.roots, seed).expect("settings within limits")
 }
 
 /// Everything that a growth gives, as one number and the normals' bits.
-fn outcome(growth: &Growth) -> (u64, Vec<u32>) {
-    let channels = System::ALL.into_iter().flat_map(|system| {
+fn outcome(growth: &Colonization) -> (u64, Vec<u32>) {
+    let channels = VesselKind::ALL.into_iter().flat_map(|system| {
         let normals = growth.normals(system).iter().flat_map(|normal| normal.to_array()).map(f32::to_bits);
         normals.chain(growth.birth_steps(system).iter().copied()).collect::<Vec<_>>()
     });
     (hash(growth), channels.collect())
 }
 
-fn hash(growth: &Growth) -> u64 {
-    hash_trees(System::ALL.map(|system| growth.tree(system)))
+fn hash(growth: &Colonization) -> u64 {
+    hash_trees(VesselKind::ALL.map(|system| growth.tree(system)))
 }
 
 fn grown(case: &Case, seed: u64) -> (u64, Vec<u32>) {
     let mut growth = start(case, seed);
     growth.run();
-    let nodes = System::ALL.map(|system| growth.tree(system).len());
+    let nodes = VesselKind::ALL.map(|system| growth.tree(system).len());
     assert!(nodes[0] > 100 && nodes[1] > 1, "{}: {nodes:?} are too few nodes to compare", case.name);
     outcome(&growth)
 }
@@ -63,7 +63,7 @@ fn portions_of_steps_change_nothing() {
                 for _ in 0..portion {
                     growth.step();
                 }
-                for system in System::ALL {
+                for system in VesselKind::ALL {
                     let _ = (growth.vessels(system), growth.drains(system).count());
                 }
             }
@@ -181,7 +181,7 @@ fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
         let [arterial, venous] = roots.unwrap_or([preset.arterial_roots, preset.venous_roots]);
         let roots = Roots { arterial, venous, given: [None, None] };
         let settings = if preset.fit { preset.settings.fit(tissue.extent()) } else { preset.settings };
-        let mut growth = Growth::new(tissue, settings, &roots, 0)?;
+        let mut growth = Colonization::new(tissue, settings, &roots, 0)?;
         growth.run();
         assert_eq!(hash(&growth), expected, "{name}: {:#018x}", hash(&growth));
     }

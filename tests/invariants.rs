@@ -4,9 +4,9 @@ mod common;
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    colonization::{AngleSpread, ColonizationSettings, Growth, StepReport, SystemSettings},
+    colonization::{AngleSpread, Colonization, ColonizationSettings, StepReport, SystemSettings},
     tissue::{Extent, TissueGrowth},
-    tree::{NO_PARENT, System, VesselTree},
+    tree::{NO_PARENT, VesselKind, VesselTree},
 };
 use common::{Case, tissues};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,7 +20,7 @@ const ON_TISSUE: f32 = 1e-5;
 /// Default settings in which one thing is changed for both systems.
 fn varied(change: impl Fn(&mut SystemSettings)) -> ColonizationSettings {
     let mut settings = ColonizationSettings { steps: STEPS, samples: SAMPLES, ..ColonizationSettings::default() };
-    for system in System::ALL {
+    for system in VesselKind::ALL {
         change(settings.system_mut(system));
     }
     settings
@@ -59,7 +59,7 @@ fn settings() -> Vec<(&'static str, ColonizationSettings)> {
 /// One run, with what it was before the present step.
 struct Run<'a> {
     case: &'a Case,
-    growth: Growth,
+    growth: Colonization,
     before: [VesselTree; 2],
     normals_before: [Vec<Vec3>; 2],
     births_before: [Vec<u32>; 2],
@@ -69,7 +69,8 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn new(case: &'a Case, settings: ColonizationSettings, seed: u64) -> Self {
-        let growth = Growth::new(case.tissue.clone(), settings, &case.roots, seed).expect("settings within limits");
+        let growth =
+            Colonization::new(case.tissue.clone(), settings, &case.roots, seed).expect("settings within limits");
         let mut run = Self {
             case,
             growth,
@@ -85,11 +86,11 @@ impl<'a> Run<'a> {
 
     fn remember(&mut self) {
         let growth = &self.growth;
-        self.before = System::ALL.map(|system| growth.tree(system).clone());
-        self.normals_before = System::ALL.map(|system| growth.normals(system).to_vec());
-        self.births_before = System::ALL.map(|system| growth.birth_steps(system).to_vec());
-        self.drains_before = System::ALL.map(|system| growth.drains_left(system));
-        self.scales = System::ALL.map(|system| growth.length_scale(system));
+        self.before = VesselKind::ALL.map(|system| growth.tree(system).clone());
+        self.normals_before = VesselKind::ALL.map(|system| growth.normals(system).to_vec());
+        self.births_before = VesselKind::ALL.map(|system| growth.birth_steps(system).to_vec());
+        self.drains_before = VesselKind::ALL.map(|system| growth.drains_left(system));
+        self.scales = VesselKind::ALL.map(|system| growth.length_scale(system));
     }
 
     /// One step, and everything that must hold after it.
@@ -99,7 +100,7 @@ impl<'a> Run<'a> {
         assert_eq!(report.step, done + 1);
         assert_eq!(self.growth.steps_done(), report.step);
         self.check_report(&report);
-        for system in System::ALL {
+        for system in VesselKind::ALL {
             self.growth.tree(system).validate().unwrap_or_else(|error| panic!("{} tree: {error}", system.name()));
             self.check_append_only(system, report.step);
             self.check_new_segments(system);
@@ -113,7 +114,7 @@ impl<'a> Run<'a> {
     fn check_report(&self, report: &StepReport) {
         assert_eq!(report.sampled, self.growth.settings().samples);
         assert!(report.born <= report.sampled);
-        for system in System::ALL {
+        for system in VesselKind::ALL {
             let of = report.system(system);
             assert_eq!(of.first_new_node as usize, self.before[system.index()].len());
             assert_eq!((of.first_new_node + of.new_nodes) as usize, self.growth.tree(system).len());
@@ -128,7 +129,7 @@ impl<'a> Run<'a> {
     }
 
     /// What was there is there still; every channel has one entry per node.
-    fn check_append_only(&self, system: System, step: u32) {
+    fn check_append_only(&self, system: VesselKind, step: u32) {
         let (index, growth) = (system.index(), &self.growth);
         let (before, now) = (&self.before[index], growth.tree(system));
         assert!(now.positions().starts_with(before.positions()), "positions changed");
@@ -141,7 +142,7 @@ impl<'a> Run<'a> {
     }
 
     /// New segments are as long as a step, and leave nodes that may have another child.
-    fn check_new_segments(&self, system: System) {
+    fn check_new_segments(&self, system: VesselKind) {
         let (growth, tree) = (&self.growth, self.growth.tree(system));
         let settings = growth.settings().system(system);
         let step = settings.step_length * self.scales[system.index()];
@@ -169,7 +170,7 @@ impl<'a> Run<'a> {
     }
 
     /// Murray's law at every node, in f64 and with the powers of std; and what is said of changed radii.
-    fn check_radii(&self, system: System) {
+    fn check_radii(&self, system: VesselKind) {
         let (tree, before) = (self.growth.tree(system), &self.before[system.index()]);
         let exponent = f64::from(self.growth.settings().system(system).bifurcation_exponent);
         let mut sums = vec![0.0; tree.len()];
@@ -195,7 +196,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn check_tissue(&self, system: System) {
+    fn check_tissue(&self, system: VesselKind) {
         let (growth, tissue) = (&self.growth, self.case.tissue.at_step(self.growth.steps_done()));
         let step = growth.settings().system(system).step_length * self.scales[system.index()];
         let limit = if growth.settings().confine { ON_TISSUE } else { step };
@@ -212,7 +213,7 @@ impl<'a> Run<'a> {
     }
 
     /// What is drawn: the tree, lifted off a surface by its radius.
-    fn check_vessels(&self, system: System) {
+    fn check_vessels(&self, system: VesselKind) {
         let (tree, normals) = (self.growth.tree(system), self.growth.normals(system));
         let vessels = self.growth.vessels(system);
         assert_eq!((vessels.parents(), vessels.radii()), (tree.parents(), tree.radii()));
@@ -229,7 +230,7 @@ fn grow(case: &Case, settings: &ColonizationSettings, seed: u64) -> usize {
     while !run.growth.is_finished() {
         run.step();
     }
-    System::ALL.map(|system| run.growth.tree(system).len()).iter().sum()
+    VesselKind::ALL.map(|system| run.growth.tree(system).len()).iter().sum()
 }
 
 #[test]

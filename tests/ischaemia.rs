@@ -2,10 +2,9 @@
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    haemodynamics::{FlowSettings, Interruption, Network, ViscosityLaw},
+    haemodynamics::{FlowSettings, Interruption, Network, Supply, TissueSupply, ViscosityLaw},
     tree::{NO_PARENT, NodeId, VesselTree},
     units::Pressure,
-    wound::{Supply, TissueSupply},
 };
 
 /// A root at the origin, a stem to node 1, and two equal branches, along x to nodes 2 and 3 and along y to 4 and 5.

@@ -1,7 +1,10 @@
 //! Procedural organs are what their documentation says: closed, oriented, human-sized, repeatable, different by seed.
 
 use bevy_math::Vec3;
-use bevy_vessels::synthesis::organ::{Colon, ColonSettings, LiverSettings, OrganMesh};
+use bevy_vessels::synthesis::{
+    mesh::ShadedMesh,
+    organ::{Colon, ColonSettings, LiverSettings},
+};
 use std::collections::BTreeMap;
 
 const SEEDS: std::ops::Range<u64> = 0..12;
@@ -11,7 +14,7 @@ fn colon(seed: u64) -> Colon {
 }
 
 /// Index of each vertex's position: equal for vertices that coincide.
-fn weld(mesh: &OrganMesh) -> Vec<usize> {
+fn weld(mesh: &ShadedMesh) -> Vec<usize> {
     let mut seen = BTreeMap::new();
     mesh.positions
         .iter()
@@ -23,7 +26,7 @@ fn weld(mesh: &OrganMesh) -> Vec<usize> {
 }
 
 /// Checks that every edge is shared by two triangles running along it in opposite directions, and gives V − E + F.
-fn assert_closed(mesh: &OrganMesh, name: &str) -> isize {
+fn assert_closed(mesh: &ShadedMesh, name: &str) -> isize {
     let welded = weld(mesh);
     let mut edges: BTreeMap<(usize, usize), (u32, u32)> = BTreeMap::new();
     for corners in &mesh.triangles {
@@ -40,7 +43,7 @@ fn assert_closed(mesh: &OrganMesh, name: &str) -> isize {
     vertices as isize - edges.len() as isize + mesh.triangles.len() as isize
 }
 
-fn assert_sound(mesh: &OrganMesh, name: &str) {
+fn assert_sound(mesh: &ShadedMesh, name: &str) {
     let count = mesh.positions.len();
     assert_eq!(
         [mesh.normals.len(), mesh.uvs.len(), mesh.colors.len()],

@@ -6,12 +6,12 @@
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    colonization::Growth,
-    io::read_mesh,
+    colonization::Colonization,
+    io::load_mesh,
     preset::PresetName,
-    rng::Stream,
+    random::Stream,
     tissue::{Tissue, TissueMode},
-    tree::{System, statistics},
+    tree::{VesselKind, statistics},
 };
 use std::{path::Path, sync::Arc};
 
@@ -36,7 +36,7 @@ fn octants(tissue: &dyn Tissue) -> Vec<Vec<Vec3>> {
 }
 
 /// Share of the least supplied octant within two final birth distances of a node.
-fn worst(growth: &Growth, octants: &[Vec<Vec3>], system: System) -> f32 {
+fn worst(growth: &Colonization, octants: &[Vec<Vec3>], system: VesselKind) -> f32 {
     let reach = 2.0 * growth.settings().system(system).node_birth_distance * growth.length_scale(system);
     let shares = octants.iter().filter_map(|samples| statistics::coverage(growth.tree(system), samples, reach));
     shares.fold(1.0, f32::min)
@@ -57,10 +57,10 @@ fn check(organs: &[&str], preset: PresetName, mode: TissueMode, least: [f32; 2])
         let octants = octants(tissue.at_step(preset.settings.steps));
         for seed in 0..SEEDS {
             let settings = preset.settings_for(tissue.extent());
-            let mut growth = Growth::new(Arc::clone(&tissue), settings, &preset.roots(), seed)
+            let mut growth = Colonization::new(Arc::clone(&tissue), settings, &preset.roots(), seed)
                 .unwrap_or_else(|error| panic!("{name}: {error}"));
             growth.run();
-            let shares = System::ALL.map(|system| worst(&growth, &octants, system));
+            let shares = VesselKind::ALL.map(|system| worst(&growth, &octants, system));
             println!("{name}, {mode:?}, seed {seed}: {:.2} and {:.2} in the worst octant", shares[0], shares[1]);
             assert!(
                 shares[0] >= least[0] && shares[1] >= least[1],

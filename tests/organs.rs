@@ -6,12 +6,12 @@
 
 use bevy_math::{DVec2, DVec3, Mat3, Vec3};
 use bevy_vessels::synthesis::{
-    colonization::{ColonizationSettings, Growth},
-    io::read_mesh,
+    colonization::{Colonization, ColonizationSettings},
+    io::load_mesh,
     mesh::TriangleMesh,
     roots::Roots,
     tissue::{MeshSurface, MeshVolume, Tissue, TissueError},
-    tree::System,
+    tree::VesselKind,
 };
 use std::{
     path::{Path, PathBuf},
@@ -48,12 +48,12 @@ fn organs() -> impl Iterator<Item = (String, TriangleMesh)> {
 }
 
 /// Grows a few steps with default settings, fitted to the organ, and checks what holds of any growth.
-fn grow(name: &str, tissue: Arc<dyn Tissue>, steps: u32, samples: u32) -> Growth {
+fn grow(name: &str, tissue: Arc<dyn Tissue>, steps: u32, samples: u32) -> Colonization {
     let settings = ColonizationSettings { steps, samples, ..ColonizationSettings::default() }.fit(tissue.extent());
     let mut growth =
-        Growth::new(tissue, settings, &Roots::default(), 5).unwrap_or_else(|error| panic!("{name}: {error}"));
+        Colonization::new(tissue, settings, &Roots::default(), 5).unwrap_or_else(|error| panic!("{name}: {error}"));
     growth.run();
-    for system in System::ALL {
+    for system in VesselKind::ALL {
         let tree = growth.tree(system);
         tree.validate().unwrap_or_else(|error| panic!("{name}, {}: {error}", system.name()));
         let residual = tree.murray_residual(growth.settings().system(system).bifurcation_exponent);
@@ -62,8 +62,8 @@ fn grow(name: &str, tissue: Arc<dyn Tissue>, steps: u32, samples: u32) -> Growth
     growth
 }
 
-fn nodes(growth: &Growth) -> impl Iterator<Item = Vec3> + '_ {
-    System::ALL.into_iter().flat_map(|system| growth.tree(system).positions().iter().copied())
+fn nodes(growth: &Colonization) -> impl Iterator<Item = Vec3> + '_ {
+    VesselKind::ALL.into_iter().flat_map(|system| growth.tree(system).positions().iter().copied())
 }
 
 /// Distance of a point from a triangle by its definition: the plane's foot if it lies within, else the nearest edge.
@@ -91,7 +91,7 @@ fn vessels_grow_on_the_surface_of_every_organ() {
         let tissue = Arc::new(MeshSurface::new(mesh).unwrap_or_else(|error| panic!("{name}: {error}")));
         let diameter = f64::from(tissue.extent().equivalent_diameter());
         let growth = grow(&name, tissue, 100, 1000);
-        let arterial = growth.tree(System::Arterial).len();
+        let arterial = growth.tree(VesselKind::Artery).len();
         assert!(arterial > 100, "{name}: only {arterial} arterial nodes grew");
         let every = nodes(&growth).count().div_ceil(60);
         for node in nodes(&growth).step_by(every) {
@@ -99,7 +99,7 @@ fn vessels_grow_on_the_surface_of_every_organ() {
             let distance = distance.fold(f64::INFINITY, f64::min);
             assert!(distance <= 1e-5 * diameter, "{name}: a node lies {distance} beside the surface");
         }
-        println!("{name}: {arterial} arterial, {} venous nodes", growth.tree(System::Venous).len());
+        println!("{name}: {arterial} arterial, {} venous nodes", growth.tree(VesselKind::Vein).len());
     }
 }
 
@@ -141,7 +141,7 @@ fn vessels_grow_inside_every_organ() {
             Err(error) => panic!("{name}: {error}"),
         };
         let growth = grow(&name, Arc::new(volume), 30, 3000);
-        let arterial = growth.tree(System::Arterial).len();
+        let arterial = growth.tree(VesselKind::Artery).len();
         assert!(arterial > 100, "{name}: only {arterial} arterial nodes grew");
         let positions: Vec<Vec3> = nodes(&growth).collect();
         let outside = windings(&mesh, &positions).into_iter().filter(|&winding| winding == 0).count();

@@ -6,7 +6,7 @@ use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     io::read_glb,
     mesh::TriangleMesh,
-    rng::Stream,
+    random::Stream,
     tissue::{Extent, MeshSurface, MeshVolume, Tissue},
 };
 use std::{

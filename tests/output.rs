@@ -5,8 +5,8 @@ use bevy_vessels::synthesis::io::{
     ObjOptions, ReadError, SwcOptions, SwcReadOptions, WriteError, load_swc, read_swc, save_csv, save_obj, save_swc,
     write_atomically, write_csv, write_obj, write_swc,
 };
-use bevy_vessels::synthesis::rng::Stream;
-use bevy_vessels::synthesis::tree::{NO_PARENT, System, VesselTree};
+use bevy_vessels::synthesis::random::Stream;
+use bevy_vessels::synthesis::tree::{NO_PARENT, VesselKind, VesselTree};
 use rand::{Rng, RngExt};
 use std::fs;
 use std::io::{self, Write};
@@ -249,7 +249,7 @@ fn real_vessels_come_back_and_have_the_published_statistics() {
 fn csv_has_one_line_per_segment_and_one_value_per_column() {
     let (arteries, veins) = (random(5, 80), small());
     let mut bytes = Vec::new();
-    write_csv(&mut bytes, &[(System::Arterial, &arteries), (System::Venous, &veins)]).expect("memory takes all");
+    write_csv(&mut bytes, &[(VesselKind::Artery, &arteries), (VesselKind::Vein, &veins)]).expect("memory takes all");
     let text = String::from_utf8(bytes).expect("text");
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
@@ -283,7 +283,7 @@ fn parse_obj(bytes: &[u8]) -> Vec<tobj::Model> {
     tobj::load_obj_buf(&mut reader, &options, |_| Err(tobj::LoadError::OpenFileFailed)).expect("an OBJ file").0
 }
 
-fn obj(trees: &[(System, &VesselTree)], options: &ObjOptions) -> Vec<u8> {
+fn obj(trees: &[(VesselKind, &VesselTree)], options: &ObjOptions) -> Vec<u8> {
     let mut bytes = Vec::new();
     write_obj(&mut bytes, trees, options).expect("memory takes all");
     bytes
@@ -298,7 +298,7 @@ fn obj_segments_are_closed_outward_round_cones() {
     let tree = small();
     for (sides, cap_rings) in [(3, 1), (8, 2), (13, 5), (64, 32)] {
         let options = ObjOptions { sides, cap_rings };
-        let models = parse_obj(&obj(&[(System::Arterial, &tree), (System::Venous, &tree)], &options));
+        let models = parse_obj(&obj(&[(VesselKind::Artery, &tree), (VesselKind::Vein, &tree)], &options));
         assert_eq!(models.iter().map(|model| model.name.as_str()).collect::<Vec<_>>(), ["arterial", "venous"]);
         for model in &models {
             let positions = points(&model.mesh.positions);
@@ -343,7 +343,7 @@ fn obj_has_the_volume_of_its_round_cones() {
         let ends = [(Vec3::ONE, r0), (Vec3::ONE + vec3(0.6, 0.0, -0.8) * length, r1)];
         let tree =
             VesselTree::from_arrays(ends.map(|e| e.0).to_vec(), vec![NO_PARENT, 0], vec![r0, r1]).expect("a tree");
-        let models = parse_obj(&obj(&[(System::Arterial, &tree)], &ObjOptions { sides: 64, cap_rings: 32 }));
+        let models = parse_obj(&obj(&[(VesselKind::Artery, &tree)], &ObjOptions { sides: 64, cap_rings: 32 }));
         let positions = points(&models[0].mesh.positions);
         let corner = |i: u32| positions[i as usize].as_dvec3();
         let volume: f64 = models[0]
@@ -363,7 +363,7 @@ fn obj_stands_coinciding_nodes_lone_roots_and_odd_options() {
     let tree = VesselTree::from_arrays(positions, vec![NO_PARENT, 0, 1, NO_PARENT], vec![0.1, 0.1, 0.05, 1.0])
         .expect("a tree");
     for options in [ObjOptions { sides: 0, cap_rings: 0 }, ObjOptions { sides: u32::MAX, cap_rings: u32::MAX }] {
-        let models = parse_obj(&obj(&[(System::Venous, &tree)], &options));
+        let models = parse_obj(&obj(&[(VesselKind::Vein, &tree)], &options));
         let positions = points(&models[0].mesh.positions);
         assert!(positions.iter().all(|p| p.is_finite() && p.distance(Vec3::ONE) < 0.2));
         for t in models[0].mesh.indices.chunks_exact(3) {
@@ -378,7 +378,7 @@ fn obj_stands_coinciding_nodes_lone_roots_and_odd_options() {
 fn the_same_tree_gives_the_same_bytes() {
     let tree = random(8, 100);
     assert_eq!(swc(&tree), swc(&tree.clone()));
-    let trees = [(System::Arterial, &tree)];
+    let trees = [(VesselKind::Artery, &tree)];
     assert_eq!(obj(&trees, &ObjOptions::default()), obj(&trees, &ObjOptions::default()));
 }
 
@@ -386,7 +386,7 @@ fn the_same_tree_gives_the_same_bytes() {
 fn saved_files_hold_what_is_written() {
     let folder = Folder::new("saved");
     let (tree, options) = (random(2, 60), ObjOptions::default());
-    let trees = [(System::Venous, &tree)];
+    let trees = [(VesselKind::Vein, &tree)];
     save_swc(folder.join("a.swc"), &tree, &SwcOptions::default()).expect("a file");
     save_obj(folder.join("a.obj"), &trees, &options).expect("a file");
     save_csv(folder.join("a.csv"), &trees).expect("a file");

@@ -5,14 +5,14 @@
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    colonization::{ColonizationSettings, Growth},
+    colonization::{Colonization, ColonizationSettings},
     preset::{Preset, PresetName},
-    rng::Stream,
+    random::Stream,
     tissue::{
         Tissue,
         shape::{Ball, Disc},
     },
-    tree::{System, VesselTree, statistics},
+    tree::{VesselKind, VesselTree, statistics},
 };
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ impl Measures {
         ]
     }
 
-    fn add(&mut self, growth: &Growth, system: System, share: f64) {
+    fn add(&mut self, growth: &Colonization, system: VesselKind, share: f64) {
         let tree = growth.tree(system);
         let measured = tree.statistics();
         let settings = growth.settings().system(system);
@@ -68,8 +68,9 @@ fn ball() -> Arc<dyn Tissue> {
     Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball of radius 0.5"))
 }
 
-fn grown(tissue: &Arc<dyn Tissue>, preset: &Preset, settings: &ColonizationSettings, seed: u64) -> Growth {
-    let mut growth = Growth::new(Arc::clone(tissue), settings.clone(), &preset.roots(), seed).expect("valid settings");
+fn grown(tissue: &Arc<dyn Tissue>, preset: &Preset, settings: &ColonizationSettings, seed: u64) -> Colonization {
+    let mut growth =
+        Colonization::new(Arc::clone(tissue), settings.clone(), &preset.roots(), seed).expect("valid settings");
     growth.run();
     growth
 }
@@ -79,7 +80,7 @@ fn measure(tissue: &Arc<dyn Tissue>, preset: &Preset, settings: &ColonizationSet
     let mut measures = [Measures::default(), Measures::default()];
     for seed in 0..seeds {
         let growth = grown(tissue, preset, settings, seed);
-        for system in System::ALL {
+        for system in VesselKind::ALL {
             if !growth.tree(system).is_empty() {
                 measures[system.index()].add(&growth, system, 1.0 / seeds as f64);
             }
@@ -170,7 +171,7 @@ fn no_venous_tree_of_the_papers_preset_stalls() {
         let share = |tree: &VesselTree, of: &VesselTree| tree.len() as f64 / of.len() as f64;
         for seed in 0..100 {
             let growth = grown(&tissue, preset, &preset.settings, seed);
-            let share = share(growth.tree(System::Venous), growth.tree(System::Arterial));
+            let share = share(growth.tree(VesselKind::Vein), growth.tree(VesselKind::Artery));
             assert!(share >= 0.5, "seed {seed}: the venous tree has {share:.2} of the arterial nodes");
         }
     }
@@ -210,7 +211,7 @@ fn a_larger_direction_weight_straightens_vessels() {
     let turn = |weight: f32| {
         let mut settings = preset.settings.clone();
         settings.arterial.direction_weight = weight;
-        mean_turn(grown(&disc(), &preset, &settings, 1).tree(System::Arterial))
+        mean_turn(grown(&disc(), &preset, &settings, 1).tree(VesselKind::Artery))
     };
     let (bent, paper, straight) = (turn(0.1), turn(0.5), turn(0.9));
     assert!(straight < paper && paper < bent, "turns of {bent}, {paper} and {straight} rad");
@@ -233,7 +234,7 @@ fn a_larger_threshold_gives_more_lateral_branches() {
         let mut settings = preset.settings.clone();
         settings.arterial.bifurcation_threshold = threshold;
         let growth = grown(&disc(), &preset, &settings, 1);
-        lateral_share(growth.tree(System::Arterial), growth.birth_steps(System::Arterial))
+        lateral_share(growth.tree(VesselKind::Artery), growth.birth_steps(VesselKind::Artery))
     };
     let (symmetric, paper, lateral) = (share(5.0), share(15.0), share(f32::INFINITY));
     assert!(symmetric < paper && paper < lateral, "{symmetric}, {paper}, {lateral}");

@@ -3,9 +3,9 @@
 use bevy_math::{DVec3, Vec3};
 use bevy_vessels::synthesis::{
     instances::MAX_FLARE,
-    rng::{Stream, VesselRng},
+    random::{Stream, VesselRng},
+    segment_index::SegmentIndex,
     tree::{NO_PARENT, NodeId, Place, VesselTree},
-    wound::SegmentIndex,
 };
 use rand::RngExt;
 

@@ -3,11 +3,11 @@
 mod common;
 
 use bevy_vessels::synthesis::{
-    colonization::{AngleSpread, ColonizationSettings, Growth, GrowthError, SystemSettings},
-    rng::{Stream, VesselRng},
+    colonization::{AngleSpread, Colonization, ColonizationError, ColonizationSettings, SystemSettings},
+    random::{Stream, VesselRng},
     roots::RootError,
     tissue::TissueGrowth,
-    tree::System,
+    tree::VesselKind,
 };
 use common::{Case, tissues};
 use rand::RngExt;
@@ -130,7 +130,7 @@ fn break_one(settings: &mut ColonizationSettings, rng: &mut VesselRng) -> &'stat
     match rng.random_range(0..BREAKS.len() + 2) {
         index if index < BREAKS.len() => {
             let (name, set, values) = BREAKS[index];
-            let system = System::ALL[rng.random_range(0..2)];
+            let system = VesselKind::ALL[rng.random_range(0..2)];
             set(settings.system_mut(system), values[rng.random_range(0..values.len())]);
             name
         }
@@ -152,7 +152,7 @@ fn grow(cases: &[Case], seed: u64) -> Option<usize> {
     let mut settings = within_limits(&mut rng);
     if rng.random_bool(0.3) {
         let name = break_one(&mut settings, &mut rng);
-        let message = match Growth::new(case.tissue.clone(), settings.clone(), &case.roots, seed) {
+        let message = match Colonization::new(case.tissue.clone(), settings.clone(), &case.roots, seed) {
             Err(error) => error.to_string(),
             Ok(_) => panic!("{name} is beyond its limits, yet growth starts: {settings:?}"),
         };
@@ -162,15 +162,15 @@ fn grow(cases: &[Case], seed: u64) -> Option<usize> {
     }
     settings.validate().unwrap_or_else(|error| panic!("{error}, yet all is within limits: {settings:?}"));
     let step = settings.arterial.step_length.min(settings.venous.step_length);
-    let mut growth = match Growth::new(case.tissue.clone(), settings, &case.roots, seed) {
+    let mut growth = match Colonization::new(case.tissue.clone(), settings, &case.roots, seed) {
         Ok(growth) => growth,
         // Two roots a ten-thousandth of a step apart are one. All tissues here are of about size 1.
-        Err(GrowthError::Roots(RootError::Coincide { .. })) if step > 100.0 => return None,
+        Err(ColonizationError::Roots(RootError::Coincide { .. })) if step > 100.0 => return None,
         Err(error) => panic!("growth does not start: {error}"),
     };
     while !growth.is_finished() {
         let report = growth.step();
-        for system in System::ALL {
+        for system in VesselKind::ALL {
             let tree = growth.tree(system);
             tree.validate().unwrap_or_else(|error| {
                 let settings = growth.settings();
@@ -179,7 +179,7 @@ fn grow(cases: &[Case], seed: u64) -> Option<usize> {
             assert_eq!(report.system(system).drains_left as usize, growth.drains_left(system));
         }
     }
-    Some(System::ALL.map(|system| growth.vessels(system).len()).iter().sum())
+    Some(VesselKind::ALL.map(|system| growth.vessels(system).len()).iter().sum())
 }
 
 #[test]

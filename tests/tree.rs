@@ -1,7 +1,7 @@
 //! Sweeps, validation, statistics and hash of trees, against shapes whose numbers are known and brute-force twins.
 
 use bevy_math::{Vec3, vec3};
-use bevy_vessels::synthesis::rng::Stream;
+use bevy_vessels::synthesis::random::Stream;
 use bevy_vessels::synthesis::tree::{
     NO_PARENT, TreeError, VesselTree, hash_trees,
     statistics::{Summary, coverage, outside},

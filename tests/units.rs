@@ -4,20 +4,20 @@
 mod torus;
 
 use bevy_vessels::synthesis::{
-    colonization::{ColonizationSettings, Growth},
+    colonization::{Colonization, ColonizationSettings},
     mesh::TriangleMesh,
     roots::Roots,
     tissue::{TissueMode, TissueSettings},
-    tree::System,
+    tree::VesselKind,
 };
 
 /// An organ of a unit's size, larger by a factor.
-fn grown(mesh: &TriangleMesh, factor: f32, mode: TissueMode, seed: u64) -> Growth {
+fn grown(mesh: &TriangleMesh, factor: f32, mode: TissueMode, seed: u64) -> Colonization {
     let positions = mesh.positions().iter().map(|&position| position * factor).collect();
     let mesh = TriangleMesh::new(positions, mesh.triangles().to_vec(), None).expect("a mesh");
     let tissue = TissueSettings { mode, resolution: 48, ..TissueSettings::default() }.build(&mesh).expect("a tissue");
     let settings = ColonizationSettings::default().fit(tissue.extent());
-    let mut growth = Growth::new(tissue, settings, &Roots::default(), seed).expect("a growth");
+    let mut growth = Colonization::new(tissue, settings, &Roots::default(), seed).expect("a growth");
     growth.run();
     growth
 }
@@ -31,7 +31,7 @@ fn metres_millimetres_and_units_grow_the_same_vessels() {
             let toy = grown(&mesh, 1.0, mode, seed);
             for (factor, exact) in [(1.0 / 1024.0, true), (1024.0, true), (0.2, false), (200.0, false)] {
                 let organ = grown(&mesh, factor, mode, seed);
-                for system in System::ALL {
+                for system in VesselKind::ALL {
                     let (a, b) = (toy.tree(system), organ.tree(system));
                     let case = format!("{mode:?}, seed {seed}, {}, times {factor}", system.name());
                     if exact {

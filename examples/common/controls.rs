@@ -5,7 +5,7 @@ use super::{
     studio::{StatusLine, View},
 };
 use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, light::NotShadowCaster, prelude::*};
-use bevy_vessels::{prelude::*, synthesis::tree::System};
+use bevy_vessels::{prelude::*, synthesis::tree::VesselKind};
 
 /// What the keys of [`ControlsPlugin`] do.
 pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours";
@@ -68,7 +68,7 @@ fn steer(
 }
 
 fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>) {
-    for (key, system) in [(KeyCode::KeyA, System::Arterial), (KeyCode::KeyV, System::Venous)] {
+    for (key, system) in [(KeyCode::KeyA, VesselKind::Artery), (KeyCode::KeyV, VesselKind::Vein)] {
         for mut look in looks.iter_mut().filter(|_| keys.just_pressed(key)) {
             let shown = look.shows(system);
             look.set_shown(system, !shown);
@@ -76,11 +76,11 @@ fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>
     }
     for mut look in looks.iter_mut().filter(|_| keys.just_pressed(KeyCode::KeyC)) {
         look.coloring = match look.coloring {
-            SegmentColoring::System => SegmentColoring::Radius,
+            SegmentColoring::Kind => SegmentColoring::Radius,
             SegmentColoring::Radius => SegmentColoring::Age,
             SegmentColoring::Age => SegmentColoring::StrahlerOrder,
             SegmentColoring::StrahlerOrder => SegmentColoring::Supply,
-            SegmentColoring::Supply => SegmentColoring::System,
+            SegmentColoring::Supply => SegmentColoring::Kind,
         };
     }
 }

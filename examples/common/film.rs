@@ -13,7 +13,7 @@ use bevy::{
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
-use bevy_vessels::synthesis::{tissue::SurfacePoint, units::Volume};
+use bevy_vessels::synthesis::{mesh::SurfacePoint, units::Volume};
 
 /// Longest step of the flow, in seconds.
 const STEP: f32 = 0.008;

@@ -176,7 +176,7 @@ fn smaller(image: &Image) -> io::Result<Image> {
 #[derive(bevy::ecs::system::SystemParam)]
 struct Networks<'w, 's> {
     organs: Query<'w, 's, (NameOrEntity, &'static GrowthProgress, Option<&'static OrganVessels>)>,
-    vessels: Query<'w, 's, (&'static VesselSystem, &'static Vessels)>,
+    vessels: Query<'w, 's, (&'static &'static Vessels)>,
 }
 
 impl Networks<'_, '_> {

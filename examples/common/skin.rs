@@ -1,7 +1,7 @@
 //! A net of small cells over an organ's surface, for what lies on it.
 
 use bevy::prelude::*;
-use bevy_vessels::synthesis::{mesh::TriangleMesh, tissue::SurfacePoint};
+use bevy_vessels::synthesis::mesh::{SurfacePoint, TriangleMesh};
 use std::collections::HashMap;
 
 /// Distance between neighbouring cells, in world units, where that doesn't take more than the most parts of an edge.

@@ -3,10 +3,7 @@
 use bevy::prelude::*;
 use bevy_vessels::{
     plugin::read_mesh,
-    synthesis::{
-        mesh::TriangleMesh,
-        tissue::{SurfacePoint, TriangleIndex},
-    },
+    synthesis::mesh::{SurfacePoint, TriangleIndex, TriangleMesh},
 };
 
 /// How far the diaphragm pushes the top of an organ, as a share of its height.

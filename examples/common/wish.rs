@@ -4,7 +4,7 @@ use crate::common::studio::StudioArgs;
 use bevy::prelude::*;
 use bevy_vessels::{
     prelude::*,
-    synthesis::{organ::RootSites, tree::System},
+    synthesis::{organ::RootSites, tree::VesselKind},
 };
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -52,7 +52,7 @@ impl OrganArgs {
             Mode::Volume => TissueMode::Volume,
             Mode::Staged => TissueMode::Staged { surface_steps: wish.settings.steps / 2 },
         };
-        for system in System::ALL {
+        for system in VesselKind::ALL {
             wish.settings.system_mut(system).terminal_radius *= radii;
         }
         let Some(roots) = roots else { return wish };

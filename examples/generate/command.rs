@@ -8,7 +8,7 @@ mod report;
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::ColonizationSettings,
-    io::{MeshReadError, read_mesh},
+    io::{MeshReadError, load_mesh},
     preset::{Preset, PresetName},
     roots::RootPlacement,
     tissue::{Ball, Cuboid, Disc, Tissue, TissueMode},

@@ -3,10 +3,10 @@
 use super::report::{Line, Measures};
 use super::{Failure, Format, Job};
 use bevy_vessels::synthesis::{
-    colonization::Growth,
+    colonization::Colonization,
     io::{ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc},
     roots::Roots,
-    tree::{System, VesselTree, hash_trees},
+    tree::{VesselKind, VesselTree, hash_trees},
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use std::time::Instant;
 pub struct Grower<'a> {
     job: &'a Job,
     roots: Roots,
-    growth: Option<Growth>,
+    growth: Option<Colonization>,
 }
 
 impl<'a> Grower<'a> {
@@ -31,7 +31,7 @@ impl<'a> Grower<'a> {
         let settings = self.job.settings.clone();
         let growth = match self.growth.take() {
             Some(mut growth) => growth.restart(settings, &self.roots, seed).map(|()| growth),
-            None => Growth::new(Arc::clone(&self.job.tissue), settings, &self.roots, seed),
+            None => Colonization::new(Arc::clone(&self.job.tissue), settings, &self.roots, seed),
         };
         let growth = self.growth.insert(growth.map_err(named)?);
         let start = Instant::now();
@@ -40,7 +40,7 @@ impl<'a> Grower<'a> {
             after_step();
         }
         let grow_ms = 1e3 * start.elapsed().as_secs_f64();
-        let hash = hash_trees(System::ALL.map(|system| growth.tree(system)));
+        let hash = hash_trees(VesselKind::ALL.map(|system| growth.tree(system)));
         Ok(Line {
             tissue: self.job.tissue_name.clone(),
             preset: self.job.preset_name.clone(),
@@ -48,20 +48,20 @@ impl<'a> Grower<'a> {
             steps: growth.steps_done(),
             grow_ms: (grow_ms * 1e3).round() / 1e3,
             hash: format!("{hash:016x}"),
-            arterial: Measures::of(growth, System::Arterial, seed),
-            venous: Measures::of(growth, System::Venous, seed),
+            arterial: Measures::of(growth, VesselKind::Artery, seed),
+            venous: Measures::of(growth, VesselKind::Vein, seed),
             files: write_files(self.job, growth, seed, hash)?,
         })
     }
 }
 
 /// Writes the vessels as they are drawn, and gives the files' paths.
-fn write_files(job: &Job, growth: &Growth, seed: u64, hash: u64) -> Result<Vec<String>, Failure> {
+fn write_files(job: &Job, growth: &Colonization, seed: u64, hash: u64) -> Result<Vec<String>, Failure> {
     let Some(folder) = &job.out else {
         return Ok(Vec::new());
     };
-    let vessels = System::ALL.map(|system| (system, growth.vessels(system)));
-    let trees: Vec<(System, &VesselTree)> =
+    let vessels = VesselKind::ALL.map(|system| (system, growth.vessels(system)));
+    let trees: Vec<(VesselKind, &VesselTree)> =
         vessels.iter().map(|(system, tree)| (*system, tree)).filter(|(_, tree)| !tree.is_empty()).collect();
     let stem = format!("{}_{}_{seed}", file_name(&tissue_stem(job)), file_name(&job.preset_name));
     let mut files = Vec::new();
@@ -86,7 +86,7 @@ fn write_files(job: &Job, growth: &Growth, seed: u64, hash: u64) -> Result<Vec<S
 }
 
 /// What it takes to grow a file's vessels again.
-fn comments(job: &Job, system: System, seed: u64, hash: u64) -> Vec<String> {
+fn comments(job: &Job, system: VesselKind, seed: u64, hash: u64) -> Vec<String> {
     vec![
         format!("{} vessels of {}, preset {}, seed {seed}", system.name(), job.tissue_name, job.preset_name),
         format!("both systems' hash: {hash:016x}"),

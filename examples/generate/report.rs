@@ -2,9 +2,9 @@
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    colonization::Growth,
-    rng::Stream,
-    tree::{System, statistics},
+    colonization::Colonization,
+    random::Stream,
+    tree::{VesselKind, statistics},
 };
 use serde::Serialize;
 
@@ -73,7 +73,7 @@ impl Measures {
     ///
     /// The terminal radius is the median over the leaves. Coverage is the share of the tissue within the last birth
     /// distance of a node.
-    pub fn of(growth: &Growth, system: System, seed: u64) -> Self {
+    pub fn of(growth: &Colonization, system: VesselKind, seed: u64) -> Self {
         let tree = growth.tree(system);
         let measured = tree.statistics();
         let tissue = growth.tissue().at_step(growth.steps_done());

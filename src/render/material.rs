@@ -1,7 +1,7 @@
 //! What segments are made of: Bevy's standard material, with a vertex stage that pulls segments from a buffer.
 
 use super::template::{ATTRIBUTE_DETAIL, ATTRIBUTE_SECOND_GOAL, ATTRIBUTE_THIRD_GOAL};
-use crate::synthesis::tree::System;
+use crate::synthesis::tree::{ByKind, VesselKind};
 use bevy::{
     asset::embedded_path,
     mesh::MeshVertexBufferLayoutRef,
@@ -77,15 +77,10 @@ impl MaterialExtension for SegmentExtension {
 /// Change this resource before vessels appear, or the material of one vessel entity at any time: see
 /// [`SegmentMaterial`]. Base colours multiply the colours of the segments, so they stay white unless a tint is wanted.
 #[derive(Resource, Clone, Debug)]
-pub struct VesselMaterials {
-    /// For arteries.
-    pub arterial: StandardMaterial,
-    /// For veins.
-    pub venous: StandardMaterial,
-}
+pub struct VesselMaterials(pub ByKind<StandardMaterial>);
 
 impl Default for VesselMaterials {
-    /// Moist tissue: rather smooth, with a faint clear film. Veins, thinner of wall, are a little duller.
+    /// Moist tissue: rather smooth, with a faint clear film. Vessels with a thinner wall than arteries are a little duller.
     fn default() -> Self {
         let moist = StandardMaterial {
             perceptual_roughness: 0.35,
@@ -94,16 +89,7 @@ impl Default for VesselMaterials {
             clearcoat_perceptual_roughness: 0.25,
             ..default()
         };
-        Self { arterial: moist.clone(), venous: StandardMaterial { perceptual_roughness: 0.42, ..moist } }
-    }
-}
-
-impl VesselMaterials {
-    /// The material of a system.
-    pub fn of(&self, system: System) -> &StandardMaterial {
-        match system {
-            System::Arterial => &self.arterial,
-            System::Venous => &self.venous,
-        }
+        let dull = StandardMaterial { perceptual_roughness: 0.42, ..moist.clone() };
+        Self(ByKind::from_fn(|kind| if kind == VesselKind::Artery { moist.clone() } else { dull.clone() }))
     }
 }

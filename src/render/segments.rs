@@ -8,13 +8,10 @@ use super::{
     upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
-    plugin::{
-        SegmentChanges, SegmentColoring, SegmentSupply, VesselAppearance, VesselSystem, VesselWounds, Vessels,
-        VesselsOf,
-    },
+    plugin::{SegmentChanges, SegmentColoring, SegmentSupply, VesselAppearance, VesselWounds, Vessels, VesselsOf},
     synthesis::{
         instances::{SegmentColors, SegmentInstance, segment_instance},
-        tree::System,
+        tree::VesselKind,
     },
 };
 use bevy::{
@@ -129,10 +126,10 @@ enum Look {
 }
 
 impl Look {
-    fn new(appearance: &VesselAppearance, system: System) -> Self {
-        let own = appearance.color(system).to_linear().to_f32_array_no_alpha();
+    fn new(appearance: &VesselAppearance, kind: VesselKind) -> Self {
+        let own = appearance.colors[kind].to_linear().to_f32_array_no_alpha();
         match appearance.coloring {
-            SegmentColoring::System => Self::Uniform(own),
+            SegmentColoring::Kind => Self::Uniform(own),
             SegmentColoring::Supply => Self::Supply(own),
             ramp => Self::Ramp(ramp),
         }
@@ -142,7 +139,7 @@ impl Look {
         match self {
             Self::Uniform(color) => SegmentColors::Uniform(color),
             Self::Supply(full) => SegmentColors::Supply { full, levels: Vec::new() },
-            Self::Ramp(SegmentColoring::System | SegmentColoring::Supply) => SegmentColors::Uniform([1.0; 3]),
+            Self::Ramp(SegmentColoring::Kind | SegmentColoring::Supply) => SegmentColors::Uniform([1.0; 3]),
             Self::Ramp(SegmentColoring::Radius) => SegmentColors::RADIUS,
             Self::Ramp(SegmentColoring::Age) => SegmentColors::AGE,
             Self::Ramp(SegmentColoring::StrahlerOrder) => SegmentColors::STRAHLER,
@@ -153,19 +150,19 @@ impl Look {
 /// Gives every new vessel entity an empty buffer and a material.
 pub(super) fn attach_buffers(
     mut commands: Commands,
-    new: Query<(Entity, &VesselSystem), (With<Vessels>, Without<SegmentBuffer>)>,
+    new: Query<(Entity, &Vessels), Without<SegmentBuffer>>,
     templates: Res<VesselMaterials>,
     mut buffers: ResMut<Assets<ShaderBuffer>>,
     mut materials: ResMut<Assets<SegmentMaterial>>,
 ) {
-    for (entity, system) in &new {
+    for (entity, vessels) in &new {
         let (capacity, stumps) = (FEWEST_SLOTS, Stumps::default());
         let bytes = (capacity + stumps.room()) * SegmentInstance::SIZE;
         let mut buffer = ShaderBuffer::with_size(bytes, RenderAssetUsages::default());
         buffer.buffer_description.label = Some("vessel segments");
         let buffer = buffers.add(buffer);
         let extension = SegmentExtension { segments: buffer.clone() };
-        let material = materials.add(SegmentMaterial { base: templates.of(system.0).clone(), extension });
+        let material = materials.add(SegmentMaterial { base: templates.0[vessels.kind()].clone(), extension });
         commands.entity(entity).insert(SegmentBuffer {
             buffer,
             material,
@@ -211,7 +208,6 @@ pub(super) struct SegmentStore<'w, 's> {
 pub(super) struct DrawnVessels {
     entity: Entity,
     vessels: &'static Vessels,
-    system: &'static VesselSystem,
     organ: &'static VesselsOf,
     changes: &'static mut SegmentChanges,
     wounds: Option<&'static VesselWounds>,
@@ -233,8 +229,8 @@ pub(super) fn update_segments(
             continue;
         }
         let look = match appearance {
-            Some(appearance) => Look::new(&appearance, drawn.system.0),
-            None => Look::new(&VesselAppearance::default(), drawn.system.0),
+            Some(appearance) => Look::new(&appearance, drawn.vessels.kind()),
+            None => Look::new(&VesselAppearance::default(), drawn.vessels.kind()),
         };
         let (vessels, segments) = (drawn.vessels, &mut *drawn.segments);
         let nodes = vessels.tree().len();

@@ -5,13 +5,13 @@
 //! 1. An organ's [`mesh`] becomes a [`tissue`]: its surface, its volume, or both in turn, with guides and a density. Or
 //!    the tissue is a plain shape, or a mask.
 //! 2. [`roots`] say where vessels enter it.
-//! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`].
+//! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`](tree::murray).
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
 //! 5. [`haemodynamics`] lets blood flow through them, [`wound`] cuts them and lets it out, [`binding`] moves them with an
 //!    organ that deforms.
 //!
-//! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`rng`] hands out
-//! random streams, [`point_grid`] finds points by distance, [`units`] turn lengths into metres.
+//! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`random`] hands out
+//! random streams, [`space`] finds points and boxes by place, [`units`] turn lengths into metres.
 //!
 //! # Words
 //!
@@ -31,7 +31,7 @@
 //!     io::{SwcOptions, save_swc},
 //!     roots::Roots,
 //!     tissue::{Disc, Tissue},
-//!     tree::System,
+//!     tree::VesselKind,
 //! };
 //! use std::sync::Arc;
 //!
@@ -40,7 +40,7 @@
 //! let settings = ColonizationSettings::default().fit(tissue.extent());
 //! let mut growth = Growth::new(tissue, settings, &Roots::default(), 7)?;
 //! growth.run();
-//! let arteries = growth.vessels(System::Arterial);
+//! let arteries = growth.vessels(VesselKind::Artery);
 //! println!("{} nodes, {} tips", arteries.len(), arteries.tips().len());
 //! # let path = std::env::temp_dir().join("bevy_vessels_doctest.swc");
 //! save_swc(&path, &arteries, &SwcOptions::default())?;
@@ -49,25 +49,21 @@
 //! # }
 //! ```
 
-mod alias;
-mod attraction;
 pub mod binding;
 pub mod colonization;
-mod curve;
-mod draws;
+pub mod generator;
+pub mod growth;
 pub mod haemodynamics;
 pub mod instances;
 pub mod io;
 pub mod mesh;
-pub mod murray;
 pub mod organ;
-mod packed_boxes;
 mod parallel;
-pub mod point_grid;
 pub mod preset;
-pub mod rng;
+pub mod random;
 pub mod roots;
-mod spatial_order;
+pub mod segment_index;
+pub mod space;
 pub mod tissue;
 pub mod tree;
 pub mod units;

@@ -1,11 +1,11 @@
 //! Named settings with their source: the paper's, its reference cases, its variations, and organs.
 //!
 //! A preset is a RON file; the built-in ones lie in `assets/presets` and are compiled in. Lengths are made for a tissue
-//! whose equivalent diameter is 1 and are fitted to the organ (see [`Preset::settings_for`]). What a file leaves out has
+//! whose equivalent diameter is 1 and are fitted to the organ (see [`Preset::generator_for`]). What a file leaves out has
 //! its default.
 
-use crate::synthesis::colonization::{ColonizationSettings, SettingsError};
-use crate::synthesis::roots::{RootPlacement, Roots};
+use crate::synthesis::generator::{Generator, GeneratorError};
+use crate::synthesis::roots::{RootPlacements, Roots};
 use crate::synthesis::tissue::{Extent, TissueSettings};
 use std::fmt;
 use std::str::FromStr;
@@ -15,6 +15,10 @@ use std::str::FromStr;
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 pub struct Preset {
+    /// Which form of presets it has. A file without it has the present form.
+    ///
+    /// Limits: at most [`Self::VERSION`]. Default: [`Self::VERSION`].
+    pub version: u32,
     /// Where the numbers come from.
     pub source: String,
     /// Whether lengths are those of a tissue of equivalent diameter 1, to be fitted to the organ. Otherwise they are
@@ -24,50 +28,55 @@ pub struct Preset {
     pub fit: bool,
     /// Where on an organ mesh vessels grow: over its surface, through its volume, or in stages.
     pub tissue: TissueSettings,
-    /// Where arteries begin.
+    /// Where vessels begin.
+    pub roots: RootPlacements,
+    /// What makes the vessels, with its settings.
     ///
-    /// Default: one root, chosen by the seed; in a long organ several.
-    pub arterial_roots: RootPlacement,
-    /// Where veins begin.
-    ///
-    /// Default: beside the arteries.
-    pub venous_roots: RootPlacement,
-    /// Settings of the growth.
-    pub settings: ColonizationSettings,
+    /// Default: space colonization with the paper's settings.
+    pub generator: Generator,
 }
 
 impl Default for Preset {
     fn default() -> Self {
         Self {
+            version: Self::VERSION,
             source: String::new(),
             fit: true,
             tissue: TissueSettings::default(),
-            arterial_roots: RootPlacement::Within(Roots::DEFAULT_REACH),
-            venous_roots: RootPlacement::Beside,
-            settings: ColonizationSettings::default(),
+            roots: RootPlacements::default(),
+            generator: Generator::default(),
         }
     }
 }
 
 impl Preset {
-    /// The settings in the lengths of a tissue of this extent.
-    pub fn settings_for(&self, extent: Extent) -> ColonizationSettings {
-        if self.fit { self.settings.clone().fit(extent) } else { self.settings.clone() }
+    /// The present form of presets. It rises when a file of the old form would no longer mean the same.
+    pub const VERSION: u32 = 1;
+
+    /// The generator, with its lengths in those of a tissue of this extent.
+    pub fn generator_for(&self, extent: Extent) -> Generator {
+        if self.fit { self.generator.clone().fit(extent) } else { self.generator.clone() }
     }
 
-    /// How both systems begin.
+    /// How all kinds of vessels begin.
     pub fn roots(&self) -> Roots {
-        Roots { arterial: self.arterial_roots.clone(), venous: self.venous_roots.clone(), given: [None, None] }
+        self.roots.clone().into()
     }
 
     /// Reads a preset of the user's own.
     ///
     /// # Errors
-    /// Text that is not such a file, with line and column, or a setting outside its limits.
+    /// Text that is not such a file, with line and column; a file of a newer form than this version of the crate knows; a
+    /// setting outside its limits.
     #[cfg(feature = "serialize")]
     pub fn from_ron(text: &str) -> Result<Self, PresetError> {
+        // Asked first, since a newer form may hold what the present one would call an error.
+        let Form { version } = ron_options().from_str(text).map_err(Box::new)?;
+        if version > Self::VERSION {
+            return Err(PresetError::Newer { version });
+        }
         let preset: Self = ron_options().from_str(text).map_err(Box::new)?;
-        preset.settings.validate()?;
+        preset.generator.validate()?;
         Ok(preset)
     }
 
@@ -79,6 +88,21 @@ impl Preset {
     pub fn to_ron(&self) -> Result<String, PresetError> {
         let pretty = ron::ser::PrettyConfig::default();
         ron_options().to_string_pretty(self, pretty).map_err(|error| PresetError::Write(error.to_string()))
+    }
+}
+
+/// What is read of a preset before anything else.
+#[cfg(feature = "serialize")]
+#[derive(serde::Deserialize)]
+#[serde(rename = "Preset", default)]
+struct Form {
+    version: u32,
+}
+
+#[cfg(feature = "serialize")]
+impl Default for Form {
+    fn default() -> Self {
+        Self { version: Preset::VERSION }
     }
 }
 
@@ -94,9 +118,20 @@ pub enum PresetError {
     /// No built-in preset has this name.
     #[error("there is no preset {0:?}; there are {names}", names = PresetName::ALL.map(PresetName::name).join(", "))]
     UnknownName(String),
+    /// A file of a form that this version of the crate doesn't know.
+    #[error(
+        "the preset has version {version}, but this version of {} reads versions up to {}; update it, or save the preset \
+         from the older program",
+        env!("CARGO_PKG_NAME"),
+        Preset::VERSION
+    )]
+    Newer {
+        /// The version found.
+        version: u32,
+    },
     /// A setting outside its limits.
     #[error(transparent)]
-    Settings(#[from] SettingsError),
+    Generator(#[from] GeneratorError),
     /// Text that is not a preset.
     #[cfg(feature = "serialize")]
     #[error("not a preset: {0}")]
@@ -212,19 +247,29 @@ mod tests {
     #[test]
     fn the_papers_preset_is_the_default() {
         let paper = PresetName::Paper.load();
-        assert_eq!(paper.settings, ColonizationSettings::default());
+        assert_eq!(paper.generator, Generator::default());
         assert_eq!(Preset { source: paper.source.clone(), ..Preset::default() }, paper);
-        assert!(paper.settings.validate().is_ok_and(|warnings| warnings.is_empty()));
+        assert!(paper.generator.validate().is_ok_and(|warnings| warnings.is_empty()));
+    }
+
+    #[test]
+    fn a_newer_form_is_refused_whatever_it_holds() {
+        let newer = Preset::from_ron("(version: 9, warp: Fast(3), generator: Sorcery((mana: [1, 2])))");
+        let text = newer.map_err(|error| error.to_string()).expect_err("a newer form");
+        assert!(text.contains("version 9") && text.contains("up to 1"), "{text}");
+        assert_eq!(Preset::from_ron("()").ok(), Some(Preset::default()));
+        assert_eq!(Preset::from_ron("(version: 1)").ok(), Some(Preset::default()));
     }
 
     #[test]
     fn bad_files_are_refused_by_name() {
         assert!("colonn".parse::<PresetName>().is_err_and(|error| error.to_string().contains("colon,")));
-        let unknown = Preset::from_ron("(settings: (stepz: 3))").map_err(|error| error.to_string());
+        let unknown = Preset::from_ron("(generator: Colonization((stepz: 3)))").map_err(|error| error.to_string());
         assert!(unknown.is_err_and(|text| text.contains("stepz")));
-        let outside = Preset::from_ron("(settings: (arterial: (direction_weight: 7.0)))").map_err(|e| e.to_string());
+        let outside = Preset::from_ron("(generator: Colonization((arterial: (direction_weight: 7.0))))")
+            .map_err(|e| e.to_string());
         assert!(outside.is_err_and(|text| text.contains("direction_weight is 7")));
-        for garbage in ["", "(", "\u{0}\u{1}", "[1, 2]", "(settings: (steps: -1))"] {
+        for garbage in ["", "(", "\u{0}\u{1}", "[1, 2]", "(generator: Colonization((steps: -1)))"] {
             assert!(Preset::from_ron(garbage).is_err(), "{garbage:?}");
         }
     }

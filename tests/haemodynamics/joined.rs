@@ -2,8 +2,8 @@
 
 use super::trees::{drawn_tree, pieces, resisting, rng, wound};
 use bevy_vessels::synthesis::{
-    haemodynamics::{BedLink, Circulation, EndSide, FlowError, Interruption, Network, RootPressure},
-    tree::{NO_PARENT, NodeId, VesselTree},
+    haemodynamics::{Circulation, EndSide, FlowError, Interruption, Network, RootPressure},
+    tree::{BedLink, NO_PARENT, NodeId, VesselTree},
     units::Pressure,
 };
 use nalgebra::{DMatrix, DVector};

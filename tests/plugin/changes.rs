@@ -127,7 +127,7 @@ fn taking_the_mesh_away_waits_for_another() {
     app.world_mut().entity_mut(organ).remove::<Mesh3d>();
     app.update();
     assert_eq!(progress(app.world(), organ).phase, GrowthPhase::WaitingForMesh);
-    assert!(published(app.world(), organ, System::Arterial).tree().is_empty());
+    assert!(published(app.world(), organ, VesselKind::Artery).tree().is_empty());
     let mesh = add_mesh(&mut app, sphere());
     app.world_mut().entity_mut(organ).insert(Mesh3d(mesh));
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
@@ -150,8 +150,8 @@ fn assert_changes_exact(steps: u32) {
     let organ = spawn(&mut app, wish);
     let mut copy: Vec<[f32; 8]> = Vec::new();
     run_until(&mut app, "the end", |world| {
-        if let Some(entity) = vessel_entity(world, organ, System::Arterial) {
-            let tree = published(world, organ, System::Arterial).tree().clone();
+        if let Some(entity) = vessel_entity(world, organ, VesselKind::Artery) {
+            let tree = published(world, organ, VesselKind::Artery).tree().clone();
             let now: Vec<_> = (0..tree.len()).map(|node| segment(&tree, node)).collect();
             let mut changes = world.get_mut::<SegmentChanges>(entity).expect("vessels keep their changes");
             copy.resize(tree.len(), [f32::NAN; 8]);
@@ -168,7 +168,7 @@ fn assert_changes_exact(steps: u32) {
     });
     assert!(copy.len() > 2500, "{} segments are too few to tell", copy.len());
     app.update();
-    let entity = vessel_entity(app.world(), organ, System::Arterial).expect("the system has vessels");
+    let entity = vessel_entity(app.world(), organ, VesselKind::Artery).expect("the system has vessels");
     assert!(app.world().get::<SegmentChanges>(entity).is_some_and(SegmentChanges::is_empty), "all is at rest");
 }
 

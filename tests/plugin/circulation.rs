@@ -8,10 +8,13 @@ use bevy_vessels::{
         OpenEnd, OrganSupply, Patient, Perfusion, SegmentSupply,
     },
     synthesis::{
-        haemodynamics::{BedSettings, FlowSettings, Pulse, RootPressure, ViscosityLaw},
+        haemodynamics::{
+            BedSettings, BleedingSettings, BloodVolumeSettings, EndState, FlowSettings, Pulse, RootPressure,
+            ViscosityLaw,
+        },
         tree::{NodeId, Place},
         units::{BLOOD_DENSITY, Pressure, Resistance, Scale, Viscosity, Volume},
-        wound::{BleedingSettings, BloodVolumeSettings, EndSide, EndState, Retraction},
+        wound::{EndSide, Retraction},
     },
 };
 
@@ -32,14 +35,14 @@ fn loss(world: &World, organ: Entity) -> BloodLoss {
 }
 
 fn artery(app: &App, organ: Entity) -> Entity {
-    vessel_entity(app.world(), organ, System::Arterial).expect("there are arteries")
+    vessel_entity(app.world(), organ, VesselKind::Artery).expect("there are arteries")
 }
 
 /// Poiseuille's law and that of the orifice in series: Δp = R·Q + K·Q².
 #[test]
 fn a_cut_tube_bleeds_what_physics_says_on_the_entity_of_its_end() {
     let mut app = theatre(FRAME);
-    let organ = organ_of(&mut app, &[(System::Arterial, &tube(40.0, 0.5, 4))], plain());
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
     app.update();
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
     let ends = open_ends(&mut app);
@@ -66,7 +69,7 @@ fn a_cut_tube_bleeds_what_physics_says_on_the_entity_of_its_end() {
 #[test]
 fn nothing_bleeds_behind_a_clamp_and_messages_say_so() {
     let mut app = theatre(FRAME);
-    let organ = organ_of(&mut app, &[(System::Arterial, &fork(0.5))], plain());
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &fork(0.5))], plain());
     app.update();
     let (mut started, mut stopped) = (MessageCursor::default(), MessageCursor::default());
     cut(&mut app, square(Vec3::new(1.0, 0.5, 0.0), Vec3::Y, 0.5));
@@ -134,11 +137,11 @@ fn organs_below_a_patient_share_the_blood() {
     let settings = BloodVolumeSettings { total: Volume::from_ml(20.0), ..BloodVolumeSettings::default() };
     let patient = app.world_mut().spawn((Transform::default(), Patient::new(settings).unwrap())).id();
     let organs = [(); 2].map(|()| {
-        let organ = organ_of(&mut app, &[(System::Arterial, &tube(40.0, 0.5, 4))], plain());
+        let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
         app.world_mut().entity_mut(organ).insert(ChildOf(patient)).remove::<Patient>();
         organ
     });
-    let alone = organ_of(&mut app, &[(System::Arterial, &tube(40.0, 0.5, 4))], plain());
+    let alone = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
     app.update();
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
     let first = loss(app.world(), alone).rate.ml_per_min();
@@ -156,7 +159,7 @@ fn organs_below_a_patient_share_the_blood() {
 #[test]
 fn time_stands_still_while_paused() {
     let mut app = theatre(FRAME);
-    let organ = organ_of(&mut app, &[(System::Arterial, &tube(40.0, 0.5, 4))], plain());
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
     app.update();
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
     let before = loss(app.world(), organ).total;
@@ -184,7 +187,7 @@ fn tissue_below_a_cut_lacks_blood_until_it_is_undone() {
     assert_eq!(intact.vertices.len(), vertices);
 
     let entity = artery(&app, organ);
-    clamp_roots(&mut app, organ, System::Arterial);
+    clamp_roots(&mut app, organ, VesselKind::Artery);
     run_until(&mut app, "no supply", |world| world.get::<OrganSupply>(organ).unwrap().ischaemic_share == 1.0);
     assert!(supply(&app).vertices.iter().all(|&supply| supply < 1e-3));
     let segments = |app: &App| app.world().get::<SegmentSupply>(entity).unwrap().segments.clone();
@@ -200,10 +203,10 @@ fn a_bed_with_resistance_joins_arteries_and_veins() {
     let venous_supply = |bed: BedSettings| {
         let mut app = theatre(FRAME);
         let organ = grown(&mut app, Perfusion { bed, ..blood() });
-        let veins = vessel_entity(app.world(), organ, System::Venous).unwrap();
+        let veins = vessel_entity(app.world(), organ, VesselKind::Vein).unwrap();
         let supply = |world: &World| world.get::<SegmentSupply>(veins).unwrap().segments.first().copied();
         run_until(&mut app, "a supply", |world| supply(world) == Some(1.0));
-        clamp_roots(&mut app, organ, System::Arterial);
+        clamp_roots(&mut app, organ, VesselKind::Artery);
         (0..3).for_each(|_| app.update());
         supply(app.world()).unwrap()
     };
@@ -237,7 +240,7 @@ fn a_regrowth_has_lost_nothing() {
 fn settings_that_cannot_be_are_named_and_can_be_mended() {
     let mut app = theatre(FRAME);
     let wrong = Perfusion { discharge_coefficient: 1.5, ..plain().1 };
-    let organ = organ_of(&mut app, &[(System::Arterial, &tube(40.0, 0.5, 4))], (plain().0, wrong));
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], (plain().0, wrong));
     let (mut failed, mut failures) = (MessageCursor::default(), Vec::<CirculationFailed>::new());
     for _ in 0..3 {
         failures.extend(drain(app.world(), &mut failed));
@@ -255,7 +258,7 @@ fn settings_that_cannot_be_are_named_and_can_be_mended() {
 #[test]
 fn an_organ_without_perfusion_does_not_bleed_any_more() {
     let mut app = theatre(FRAME);
-    let organ = organ_of(&mut app, &[(System::Arterial, &tube(40.0, 0.5, 4))], plain());
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
     app.update();
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
     app.world_mut().entity_mut(organ).remove::<Perfusion>();
@@ -270,7 +273,7 @@ fn an_organ_without_perfusion_does_not_bleed_any_more() {
 fn a_large_organ_bleeds_once_its_network_is_made() {
     let mut app = theatre(FRAME);
     let tree = tube(400.0, 0.5, 20_000);
-    let organ = organ_of(&mut app, &[(System::Arterial, &tree)], plain());
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], plain());
     cut(&mut app, square(Vec3::X * 25.005, Vec3::X, 2.0));
     run_until(&mut app, "blood", |world| loss(world, organ).bleeding_ends == 2);
     let entity = artery(&app, organ);

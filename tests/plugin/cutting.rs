@@ -6,7 +6,7 @@ use bevy::math::Affine3A;
 use bevy_vessels::{
     plugin::{
         Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, StrokeId, VesselAction,
-        VesselCommand, VesselIndex, VesselOperation, VesselOperationFailed, VesselProbe, VesselSite, VesselWounds,
+        VesselCommand, VesselIndex, VesselOperation, VesselOperationFailed, VesselPicker, VesselSite, VesselWounds,
     },
     synthesis::{
         tree::{NodeId, Place},
@@ -26,13 +26,13 @@ fn hang_askew(app: &mut App, organ: Entity) {
     app.update();
 }
 
-fn to_world(app: &App, organ: Entity, system: System) -> Affine3A {
+fn to_world(app: &App, organ: Entity, system: VesselKind) -> Affine3A {
     let vessels = vessel_entity(app.world(), organ, system).expect("the system has vessels");
     app.world().get::<GlobalTransform>(vessels).expect("vessels are somewhere").affine()
 }
 
 /// Segments whose ends lie on both sides of a plane of the world.
-fn across_plane(app: &App, organ: Entity, system: System, point: Vec3, normal: Vec3) -> Vec<NodeId> {
+fn across_plane(app: &App, organ: Entity, system: VesselKind, point: Vec3, normal: Vec3) -> Vec<NodeId> {
     let (vessels, to_world) = (published(app.world(), organ, system), to_world(app, organ, system));
     let side = |node: usize| (to_world.transform_point3(vessels.tree().positions()[node]) - point).dot(normal) > 0.0;
     let crossed = vessels.tree().segments().filter(|&(node, parent)| side(node) != side(parent));
@@ -44,18 +44,18 @@ fn a_blade_of_the_world_severs_what_it_crosses_however_the_organ_hangs() {
     let mut app = theatre(FRAME);
     let organ = grown(&mut app, ());
     hang_askew(&mut app, organ);
-    let to_world_now = to_world(&app, organ, System::Arterial);
+    let to_world_now = to_world(&app, organ, VesselKind::Artery);
     assert!(to_world_now.matrix3.determinant() < 0.0, "the organ is mirrored");
     for (number, normal) in [Vec3::new(1.0, 0.2, -0.4), Vec3::new(-0.3, 1.0, 0.5)].into_iter().enumerate() {
         let point = to_world_now.transform_point3(Vec3::new(0.03, -0.05 * number as f32, 0.02));
-        let expected = System::ALL.map(|system| across_plane(&app, organ, system, point, normal));
+        let expected = VesselKind::ALL.map(|system| across_plane(&app, organ, system, point, normal));
         cut(&mut app, square(point, normal, 100.0));
-        for system in System::ALL {
+        for system in VesselKind::ALL {
             assert!(!expected[system.index()].is_empty());
             assert_eq!(severed(app.world(), organ, system), expected[system.index()], "{}", system.name());
         }
         operate(&mut app, CuttableVessels::undo);
-        assert!(System::ALL.iter().all(|&system| wounds(app.world(), organ, system).is_empty()));
+        assert!(VesselKind::ALL.iter().all(|&system| wounds(app.world(), organ, system).is_empty()));
     }
 }
 
@@ -63,7 +63,7 @@ fn a_blade_of_the_world_severs_what_it_crosses_however_the_organ_hangs() {
 fn an_action_goes_to_all_organs_or_to_the_one_that_it_names() {
     let mut app = theatre(FRAME);
     let tree = tube(10.0, 0.1, 5);
-    let both = [(System::Arterial, &tree), (System::Venous, &tree)];
+    let both = [(VesselKind::Artery, &tree), (VesselKind::Vein, &tree)];
     let organs = [(); 3].map(|()| organ_of(&mut app, &both, Cuttable::default()));
     let blade = square(Vec3::X * 3.0, Vec3::X, 1.0);
     let mut messages = MessageCursor::default();
@@ -73,10 +73,10 @@ fn an_action_goes_to_all_organs_or_to_the_one_that_it_names() {
     assert!(done.iter().all(|operation| (operation.kind, operation.report.severed) == (OperationKind::Cut, 1)));
     assert!(organs.iter().all(|organ| done.iter().filter(|operation| operation.organ == *organ).count() == 2));
     operate(&mut app, |vessels| vessels.request(VesselCommand::new(VesselAction::UndoAll).on(organs[1])));
-    let is_whole = |app: &App, organ| severed(app.world(), organ, System::Venous).is_empty();
+    let is_whole = |app: &App, organ| severed(app.world(), organ, VesselKind::Vein).is_empty();
     assert_eq!(organs.map(|organ| is_whole(&app, organ)), [false, true, false]);
     operate(&mut app, |vessels| vessels.request(VesselCommand::new(VesselAction::Cut(blade)).on(organs[1])));
-    assert_eq!(organs.map(|organ| severed(app.world(), organ, System::Arterial).len()), [1, 1, 1]);
+    assert_eq!(organs.map(|organ| severed(app.world(), organ, VesselKind::Artery).len()), [1, 1, 1]);
     // The last action touched the second organ alone, the one before what was left of the first.
     operate(&mut app, CuttableVessels::undo);
     assert_eq!(organs.map(|organ| is_whole(&app, organ)), [false, true, false]);
@@ -112,7 +112,7 @@ fn messages_and_the_resource_do_the_same() {
             }
         }
         let reports = drain::<VesselOperation>(app.world(), &mut messages).into_iter().map(|done| done.report);
-        let left = System::ALL.map(|system| {
+        let left = VesselKind::ALL.map(|system| {
             wounds(app.world(), organ, system).ends(published(app.world(), organ, system).tree()).collect::<Vec<_>>()
         });
         (reports.collect::<Vec<_>>(), left)
@@ -129,7 +129,7 @@ fn sweeps(segments: std::ops::Range<u32>) -> impl Iterator<Item = (NodeId, Blade
 #[test]
 fn a_stroke_of_many_frames_is_undone_at_once() {
     let mut app = theatre(FRAME);
-    let organ = organ_of(&mut app, &[(System::Arterial, &tube(20.0, 0.1, 20))], Cuttable::default());
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(20.0, 0.1, 20))], Cuttable::default());
     cut(&mut app, square(Vec3::X * 18.5, Vec3::X, 1.0));
     let before: Vec<_> = open_ends(&mut app);
     let mut messages = MessageCursor::default();
@@ -165,8 +165,8 @@ fn a_stroke_of_many_frames_is_undone_at_once() {
 fn strokes_of_two_hands_are_undone_apart_unless_they_meet() {
     let mut app = theatre(FRAME);
     let tree = tube(20.0, 0.1, 20);
-    let organs = [(); 2].map(|()| organ_of(&mut app, &[(System::Arterial, &tree)], Cuttable::default()));
-    let severed_of = |app: &App| organs.map(|organ| severed(app.world(), organ, System::Arterial).len());
+    let organs = [(); 2].map(|()| organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default()));
+    let severed_of = |app: &App| organs.map(|organ| severed(app.world(), organ, VesselKind::Artery).len());
     let hands = organs.map(|organ| (organ, StrokeId::begin()));
     for (_, blade) in sweeps(1..5) {
         operate(&mut app, |vessels| {
@@ -187,33 +187,33 @@ fn strokes_of_two_hands_are_undone_apart_unless_they_meet() {
             vessels.request(VesselCommand::new(VesselAction::Cut(blade)).on(organs[0]).in_stroke(hands[0].1));
         });
     }
-    let sealed = wounds(app.world(), organs[0], System::Arterial).injured().count();
+    let sealed = wounds(app.world(), organs[0], VesselKind::Artery).injured().count();
     assert_eq!((severed_of(&app), sealed), ([7, 0], 10));
     assert_eq!(app.world().resource::<CuttableVessels>().actions(), 1);
     operate(&mut app, |vessels| vessels.request(VesselCommand::new(VesselAction::Undo).on(organs[0])));
-    assert!(wounds(app.world(), organs[0], System::Arterial).is_empty());
-    assert!(!wounds(app.world(), organs[1], System::Arterial).is_empty(), "the cautery reached the other organ too");
+    assert!(wounds(app.world(), organs[0], VesselKind::Artery).is_empty());
+    assert!(!wounds(app.world(), organs[1], VesselKind::Artery).is_empty(), "the cautery reached the other organ too");
     operate(&mut app, CuttableVessels::undo);
-    assert!(wounds(app.world(), organs[1], System::Arterial).is_empty());
+    assert!(wounds(app.world(), organs[1], VesselKind::Artery).is_empty());
 }
 
 #[test]
 fn open_ends_are_entities_that_face_out_of_the_lumen() {
     let mut app = theatre(FRAME);
-    let organ = organ_of(&mut app, &[(System::Arterial, &fork(0.05))], Cuttable::default());
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &fork(0.05))], Cuttable::default());
     hang_askew(&mut app, organ);
-    let to_world = to_world(&app, organ, System::Arterial);
+    let to_world = to_world(&app, organ, VesselKind::Artery);
     let blade = square(Vec3::new(1.0, 0.5, 0.0), Vec3::Y, 0.5);
     cut(&mut app, blade.to_local(&to_world.inverse()).unwrap());
     let ends = open_ends(&mut app);
     let [proximal, distal] = ends[..] else { panic!("two ends, not {ends:?}") };
     assert_eq!((proximal.side, distal.side), (EndSide::Proximal, EndSide::Distal));
     for end in [&proximal, &distal] {
-        assert_eq!((end.organ, end.system, end.place.node, end.generation), (organ, System::Arterial, NodeId(2), 1));
+        assert_eq!((end.organ, end.system, end.place.node, end.generation), (organ, VesselKind::Artery, NodeId(2), 1));
     }
     assert!(proximal.position.y < 0.5 && distal.position.y > 0.5);
     assert!(proximal.direction.distance(Vec3::Y) < 1e-6 && distal.direction.distance(Vec3::NEG_Y) < 1e-6);
-    let vessels = vessel_entity(app.world(), organ, System::Arterial).unwrap();
+    let vessels = vessel_entity(app.world(), organ, VesselKind::Artery).unwrap();
     let entities = app.world().get::<OpenEndEntities>(vessels).unwrap().clone();
     assert_eq!(entities.iter().len(), 2);
     for (id, entity) in entities.iter() {
@@ -227,7 +227,7 @@ fn open_ends_are_entities_that_face_out_of_the_lumen() {
     // A clamp on the far piece closes the far end, and taking it off opens it.
     operate(&mut app, |vessels_now| vessels_now.clamp_at(vessels, Place::new(NodeId(2), 0.9)));
     assert_eq!(open_ends(&mut app), [proximal]);
-    let (clamp, _) = wounds(app.world(), organ, System::Arterial).clamps().next().expect("a clamp is on");
+    let (clamp, _) = wounds(app.world(), organ, VesselKind::Artery).clamps().next().expect("a clamp is on");
     operate(&mut app, |vessels_now| vessels_now.unclamp(vessels, clamp));
     assert_eq!(open_ends(&mut app).len(), 2);
     operate(&mut app, CuttableVessels::undo_all);
@@ -240,13 +240,13 @@ fn clamps_find_the_nearest_vessel_of_the_world() {
     let mut app = theatre(FRAME);
     let tree = tube(10.0, 0.1, 5);
     let [left, right] = [0.0, 4.0].map(|y| {
-        let organ = organ_of(&mut app, &[(System::Arterial, &tree)], Cuttable::default());
+        let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
         app.world_mut().entity_mut(organ).insert(Transform::from_xyz(0.0, y, 0.0).with_scale(Vec3::new(1.0, 2.0, 1.0)));
         organ
     });
     operate(&mut app, |vessels| vessels.clamp(Vec3::new(3.0, 3.0, 0.0), 1.5));
-    assert_eq!([left, right].map(|organ| wounds(app.world(), organ, System::Arterial).clamps().count()), [0, 1]);
-    let (_, place) = wounds(app.world(), right, System::Arterial).clamps().next().unwrap();
+    assert_eq!([left, right].map(|organ| wounds(app.world(), organ, VesselKind::Artery).clamps().count()), [0, 1]);
+    let (_, place) = wounds(app.world(), right, VesselKind::Artery).clamps().next().unwrap();
     assert_eq!(place.node, NodeId(2));
     assert!((place.along - 0.5).abs() < 1e-6, "{place:?}");
     let mut failed = MessageCursor::default();
@@ -259,7 +259,7 @@ fn clamps_find_the_nearest_vessel_of_the_world() {
     });
     assert_eq!(what.collect::<Vec<_>>(), ["vessel", "clamp"]);
     operate(&mut app, |vessels| vessels.unclamp_near(Vec3::new(5.0, 4.0, 0.0), 2.1));
-    assert_eq!(wounds(app.world(), right, System::Arterial).clamps().count(), 0);
+    assert_eq!(wounds(app.world(), right, VesselKind::Artery).clamps().count(), 0);
 }
 
 /// Against all segments, one by one, in the world.
@@ -270,8 +270,8 @@ fn the_probe_finds_the_nearest_wall_under_uneven_scale() {
     hang_askew(&mut app, organ);
     let probe = app
         .world_mut()
-        .register_system(|In((point, reach)): In<(Vec3, f32)>, mut probe: VesselProbe| probe.nearest(point, reach));
-    let to_world = to_world(&app, organ, System::Arterial);
+        .register_system(|In((point, reach)): In<(Vec3, f32)>, mut probe: VesselPicker| probe.nearest(point, reach));
+    let to_world = to_world(&app, organ, VesselKind::Artery);
     let scale = to_world.matrix3.determinant().abs().cbrt();
     let mut found = 0;
     for i in 0..60 {
@@ -279,7 +279,7 @@ fn the_probe_finds_the_nearest_wall_under_uneven_scale() {
         let local = 0.5 * Vec3::new((1.3 * angle).sin(), (2.1 * angle).cos(), (0.7 * angle).sin());
         let (point, reach) = (to_world.transform_point3(local), 0.002 * angle);
         let mut nearest = f32::INFINITY;
-        for system in System::ALL {
+        for system in VesselKind::ALL {
             let vessels = published(app.world(), organ, system);
             for (node, parent) in vessels.tree().segments() {
                 let [a, b] = [parent, node].map(|node| to_world.transform_point3(vessels.tree().positions()[node]));
@@ -307,13 +307,13 @@ fn a_regrowth_has_no_wounds() {
     app.world_mut().get_mut::<Vasculature>(organ).unwrap().seed = 5;
     app.update();
     assert_eq!(open_ends(&mut app), [], "in the very frame in which the vessels are others");
-    assert!(System::ALL.iter().all(|&system| wounds(app.world(), organ, system).is_empty()));
+    assert!(VesselKind::ALL.iter().all(|&system| wounds(app.world(), organ, system).is_empty()));
     assert_eq!(app.world().resource::<CuttableVessels>().actions(), 0);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     app.update();
-    let expected = across_plane(&app, organ, System::Arterial, Vec3::Y * 0.01, Vec3::Y);
+    let expected = across_plane(&app, organ, VesselKind::Artery, Vec3::Y * 0.01, Vec3::Y);
     cut(&mut app, square(Vec3::Y * 0.01, Vec3::Y, 3.0));
-    assert_eq!(severed(app.world(), organ, System::Arterial), expected, "the index is that of the new vessels");
+    assert_eq!(severed(app.world(), organ, VesselKind::Artery), expected, "the index is that of the new vessels");
 }
 
 #[test]
@@ -325,21 +325,21 @@ fn wounds_stay_while_vessels_go_on_growing() {
     run_until(&mut app, "half of the steps", |world| progress(world, organ).step == STEPS / 2);
     app.update();
     let (point, normal) = (Vec3::Y * 0.3, Vec3::Y);
-    let first = across_plane(&app, organ, System::Arterial, point, normal);
+    let first = across_plane(&app, organ, VesselKind::Artery, point, normal);
     cut(&mut app, square(point, normal, 3.0));
-    assert_eq!(severed(app.world(), organ, System::Arterial), first);
+    assert_eq!(severed(app.world(), organ, VesselKind::Artery), first);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     app.update();
-    assert_eq!(severed(app.world(), organ, System::Arterial), first);
-    let all = across_plane(&app, organ, System::Arterial, point, normal);
+    assert_eq!(severed(app.world(), organ, VesselKind::Artery), first);
+    let all = across_plane(&app, organ, VesselKind::Artery, point, normal);
     assert!(all.len() > first.len(), "vessels went on growing across the cut");
     for end in open_ends(&mut app) {
         let vessels = published(app.world(), organ, end.system);
         assert_eq!(end.position, vessels.tree().position_at(end.place), "ends move with their vessels");
     }
     cut(&mut app, square(point + 1e-3, normal, 3.0));
-    let now = severed(app.world(), organ, System::Arterial);
-    assert!(across_plane(&app, organ, System::Arterial, point + 1e-3, normal).iter().all(|node| now.contains(node)));
+    let now = severed(app.world(), organ, VesselKind::Artery);
+    assert!(across_plane(&app, organ, VesselKind::Artery, point + 1e-3, normal).iter().all(|node| now.contains(node)));
 }
 
 #[test]
@@ -360,16 +360,16 @@ fn what_is_despawned_or_no_longer_cuttable_leaves_nothing() {
     assert_eq!(app.world().resource::<CuttableVessels>().actions(), 0);
     app.world_mut().entity_mut(organs[1]).insert(Cuttable::default());
     app.update();
-    assert!(wounds(app.world(), organs[1], System::Arterial).is_empty());
+    assert!(wounds(app.world(), organs[1], VesselKind::Artery).is_empty());
 }
 
 #[test]
 fn organs_that_cannot_be_cut_are_named_and_others_are_cut() {
     let mut app = theatre(FRAME);
     let tree = tube(10.0, 0.1, 5);
-    let flat = organ_of(&mut app, &[(System::Arterial, &tree)], Cuttable::default());
-    let organ = organ_of(&mut app, &[(System::Arterial, &tree)], Cuttable::default());
-    let bare = organ_of(&mut app, &[(System::Arterial, &tree)], ());
+    let flat = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
+    let bare = organ_of(&mut app, &[(VesselKind::Artery, &tree)], ());
     app.world_mut().entity_mut(flat).insert(Transform::from_scale(Vec3::new(1.0, 0.0, 1.0)));
     let mut failed = MessageCursor::default();
     cut(&mut app, square(Vec3::X, Vec3::X, 1.0));
@@ -377,7 +377,7 @@ fn organs_that_cannot_be_cut_are_named_and_others_are_cut() {
     assert!(
         matches!(errors[..], [VesselOperationFailed { error: OperationError::Blade { organ, .. }, .. }] if organ == flat)
     );
-    assert_eq!(severed(app.world(), organ, System::Arterial), [NodeId(1)]);
+    assert_eq!(severed(app.world(), organ, VesselKind::Artery), [NodeId(1)]);
     let command = VesselCommand::new(VesselAction::Cut(square(Vec3::X * 3.0, Vec3::X, 1.0)));
     operate(&mut app, |vessels| vessels.request(command.clone().on(bare)));
     let errors: Vec<VesselOperationFailed> = drain(app.world(), &mut failed);
@@ -393,7 +393,7 @@ fn organs_that_cannot_be_cut_are_named_and_others_are_cut() {
         "one for the flat organ, one for all"
     );
     assert!(
-        vessel_entity(app.world(), bare, System::Arterial)
+        vessel_entity(app.world(), bare, VesselKind::Artery)
             .is_some_and(|entity| app.world().get::<VesselIndex>(entity).is_none())
     );
 }
@@ -402,16 +402,16 @@ fn organs_that_cannot_be_cut_are_named_and_others_are_cut() {
 fn a_large_tree_can_be_cut_before_its_index_is_ready() {
     let mut app = theatre(FRAME);
     let tree = tube(30_000.0, 0.1, 30_000);
-    let organ = organ_of(&mut app, &[(System::Arterial, &tree)], Cuttable::default());
-    let entity = vessel_entity(app.world(), organ, System::Arterial).unwrap();
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
+    let entity = vessel_entity(app.world(), organ, VesselKind::Artery).unwrap();
     for node in [7_u32, 15_000, 29_999] {
         cut(&mut app, square(Vec3::X * (node as f32 - 0.5), Vec3::X, 1.0));
-        assert!(wounds(app.world(), organ, System::Arterial).is_severed(NodeId(node)));
+        assert!(wounds(app.world(), organ, VesselKind::Artery).is_severed(NodeId(node)));
     }
     run_until(&mut app, "the index", |world| {
         world.get::<VesselIndex>(entity).unwrap().is_complete(world.get::<Vessels>(entity).unwrap())
     });
     cut(&mut app, square(Vec3::X * 20_000.5, Vec3::X, 1.0));
     let nodes = [7, 15_000, 20_001, 29_999].map(NodeId);
-    assert_eq!(severed(app.world(), organ, System::Arterial), nodes);
+    assert_eq!(severed(app.world(), organ, VesselKind::Artery), nodes);
 }

@@ -5,7 +5,7 @@ use crate::*;
 use bevy::math::Affine3A;
 use bevy_vessels::{
     plugin::{Cuttable, FollowsMesh, FollowsTetrahedra, SegmentChanges},
-    synthesis::{binding::TetMesh, tissue::TissueMode, tree::NodeId},
+    synthesis::{mesh::TetMesh, tissue::TissueMode, tree::NodeId},
 };
 
 const FRAME: Duration = Duration::from_millis(16);
@@ -44,7 +44,7 @@ fn vessels_follow_in_the_same_frame_and_nothing_grows_again() {
     let before = trees(app.world(), organ);
     move_vertices(&mut app, organ, shear);
     app.update();
-    for (system, before) in System::ALL.into_iter().zip(&before) {
+    for (system, before) in VesselKind::ALL.into_iter().zip(&before) {
         let vessels = published(app.world(), organ, system);
         assert_eq!((vessels.tree().parents(), vessels.tree().radii()), (before.parents(), before.radii()));
         let (min, max) = (vessels.aabb().min(), vessels.aabb().max());
@@ -66,7 +66,7 @@ fn what_is_cut_is_where_the_organ_has_it() {
     let organ = following(&mut app);
     let (point, normal) = (Vec3::Y * 0.2, Vec3::Y);
     cut(&mut app, square(point, normal, 3.0));
-    let severed_before = System::ALL.map(|system| severed(app.world(), organ, system));
+    let severed_before = VesselKind::ALL.map(|system| severed(app.world(), organ, system));
     move_vertices(&mut app, organ, |at| at + 10.0 * Vec3::X);
     app.update();
     for end in open_ends(&mut app) {
@@ -74,16 +74,16 @@ fn what_is_cut_is_where_the_organ_has_it() {
         assert_eq!(end.position, vessels.tree().position_at(end.place));
         assert!(end.position.x > 9.0, "the end is at {}", end.position);
     }
-    assert_eq!(severed_before, System::ALL.map(|system| severed(app.world(), organ, system)), "the bond survives");
+    assert_eq!(severed_before, VesselKind::ALL.map(|system| severed(app.world(), organ, system)), "the bond survives");
     cut(&mut app, square(-point, normal, 3.0));
-    assert_eq!(severed_before, System::ALL.map(|system| severed(app.world(), organ, system)), "nothing is there");
-    let ends = |app: &App, system: System| {
+    assert_eq!(severed_before, VesselKind::ALL.map(|system| severed(app.world(), organ, system)), "nothing is there");
+    let ends = |app: &App, system: VesselKind| {
         let vessels = published(app.world(), organ, system);
         wounds(app.world(), organ, system).ends(vessels.tree()).count()
     };
-    let ends_before = System::ALL.map(|system| ends(&app, system));
+    let ends_before = VesselKind::ALL.map(|system| ends(&app, system));
     cut(&mut app, square(-point + 10.0 * Vec3::X, normal, 3.0));
-    for system in System::ALL {
+    for system in VesselKind::ALL {
         let vessels = published(app.world(), organ, system);
         let below = |node: usize| vessels.tree().positions()[node].y < -point.y;
         let crossed = vessels.tree().segments().filter(|&(node, parent)| below(node) != below(parent));
@@ -250,11 +250,11 @@ fn vessels_within_a_sheared_box_move_as_every_point_of_it() {
     // The blade meets them where they are.
     let level = map.transform_point3(2.0 * point).y;
     cut(&mut app, square(Vec3::Y * level, normal, 3.0));
-    let vessels = published(app.world(), organ, System::Arterial);
+    let vessels = published(app.world(), organ, VesselKind::Artery);
     let below = |node: usize| vessels.tree().positions()[node].y < level;
     let crossed: Vec<_> = vessels.tree().segments().filter(|&(node, parent)| below(node) != below(parent)).collect();
     assert!(!crossed.is_empty());
-    let wounds = wounds(app.world(), organ, System::Arterial);
+    let wounds = wounds(app.world(), organ, VesselKind::Artery);
     assert!(crossed.iter().all(|&(node, _)| wounds.is_severed(NodeId(node as u32))));
     assert_eq!(progress(app.world(), organ).phase, GrowthPhase::Finished);
 }

@@ -61,5 +61,5 @@ fn an_organ_from_a_file_grows_once_it_is_loaded() {
     assert_eq!(progress(app.world(), organ).phase, GrowthPhase::WaitingForMesh);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     assert_published(app.world(), organ);
-    assert!(progress(app.world(), organ).nodes(System::Arterial) > 100);
+    assert!(progress(app.world(), organ).nodes(VesselKind::Artery) > 100);
 }

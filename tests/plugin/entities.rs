@@ -12,17 +12,17 @@ fn each_system_with_roots_gets_one_entity() {
     let mut app = headless(GrowthBudget::default());
     let organ = spawn(&mut app, quick().with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::None));
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
-    assert!(vessel_entity(app.world(), organ, System::Arterial).is_some());
+    assert!(vessel_entity(app.world(), organ, VesselKind::Artery).is_some());
     assert_eq!(vessel_count(&mut app), 1);
 
     *app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes") = quick();
-    run_until(&mut app, "veins", |world| vessel_entity(world, organ, System::Venous).is_some());
+    run_until(&mut app, "veins", |world| vessel_entity(world, organ, VesselKind::Vein).is_some());
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     assert_published(app.world(), organ);
     assert_eq!(vessel_count(&mut app), 2);
 
     app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes").venous_roots = RootPlacement::None;
-    run_until(&mut app, "no veins", |world| vessel_entity(world, organ, System::Venous).is_none());
+    run_until(&mut app, "no veins", |world| vessel_entity(world, organ, VesselKind::Vein).is_none());
     assert_eq!(vessel_count(&mut app), 1);
 }
 
@@ -31,7 +31,7 @@ fn vessels_are_named_children_of_their_organ() {
     let mut app = headless(GrowthBudget::default());
     let organ = spawn(&mut app, quick());
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
-    for (system, name) in [(System::Arterial, "Arteries"), (System::Venous, "Veins")] {
+    for (system, name) in [(VesselKind::Artery, "Arteries"), (VesselKind::Vein, "Veins")] {
         let entity = vessel_entity(app.world(), organ, system).expect("the system has vessels");
         assert_eq!(app.world().get::<ChildOf>(entity), Some(&ChildOf(organ)));
         assert_eq!(app.world().get::<VesselsOf>(entity), Some(&VesselsOf(organ)));
@@ -48,7 +48,7 @@ fn vessels_follow_the_organ() {
     let transform = Transform::from_xyz(3.0, -2.0, 1.0).with_scale(Vec3::splat(2.0));
     app.world_mut().entity_mut(organ).insert(transform);
     (0..3).for_each(|_| app.update());
-    let entity = vessel_entity(app.world(), organ, System::Venous).expect("the system has vessels");
+    let entity = vessel_entity(app.world(), organ, VesselKind::Vein).expect("the system has vessels");
     let global = app.world().get::<GlobalTransform>(entity).map(GlobalTransform::compute_transform);
     assert_eq!(global, Some(transform));
     assert_eq!(before, trees(app.world(), organ), "moving an organ does not grow it again");
@@ -112,12 +112,12 @@ fn appearance_hides_and_shows_systems() {
     let visibility = |app: &App, system| {
         vessel_entity(app.world(), organ, system).and_then(|entity| app.world().get::<Visibility>(entity).copied())
     };
-    assert_eq!(visibility(&app, System::Arterial), Some(Visibility::Inherited));
-    assert_eq!(visibility(&app, System::Venous), Some(Visibility::Hidden));
+    assert_eq!(visibility(&app, VesselKind::Artery), Some(Visibility::Inherited));
+    assert_eq!(visibility(&app, VesselKind::Vein), Some(Visibility::Hidden));
     let mut look = app.world_mut().get_mut::<VesselAppearance>(organ).expect("an organ has a look");
-    look.set_shown(System::Arterial, false);
-    look.set_shown(System::Venous, true);
+    look.set_shown(VesselKind::Artery, false);
+    look.set_shown(VesselKind::Vein, true);
     app.update();
-    assert_eq!(visibility(&app, System::Arterial), Some(Visibility::Hidden));
-    assert_eq!(visibility(&app, System::Venous), Some(Visibility::Inherited));
+    assert_eq!(visibility(&app, VesselKind::Artery), Some(Visibility::Hidden));
+    assert_eq!(visibility(&app, VesselKind::Vein), Some(Visibility::Inherited));
 }

@@ -5,7 +5,7 @@ use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, PrimitiveTopology},
 };
-use bevy_vessels::plugin::{GrowthFailed, OrganError, OrganMeshError};
+use bevy_vessels::plugin::{GrowthFailed, OrganGrowthError, OrganMeshError};
 
 /// Runs until the organ fails; gives the message.
 #[track_caller]
@@ -66,7 +66,7 @@ fn bad_meshes_fail_their_organ_only_and_good_ones_repair_it() {
         let mesh = add_mesh(&mut app, mesh);
         let organ = app.world_mut().spawn((Mesh3d(mesh), quick())).id();
         let error = failure(&mut app, organ).error;
-        assert!(matches!(error, OrganError::Mesh(_) | OrganError::Tissue(_)), "{what}: {error}");
+        assert!(matches!(error, OrganGrowthError::Mesh(_) | OrganGrowthError::Tissue(_)), "{what}: {error}");
         println!("{what}: {error}");
         let good = add_mesh(&mut app, sphere());
         app.world_mut().entity_mut(organ).insert(Mesh3d(good));
@@ -84,7 +84,7 @@ fn a_bad_mesh_takes_the_vessels_of_the_good_one_away() {
     let id = app.world().get::<Mesh3d>(organ).map(|mesh| mesh.id()).expect("the organ has a mesh");
     *app.world_mut().resource_mut::<Assets<Mesh>>().get_mut(id).expect("the mesh is there") = list(vec![]);
     failure(&mut app, organ);
-    assert!(published(app.world(), organ, System::Arterial).tree().is_empty());
+    assert!(published(app.world(), organ, VesselKind::Artery).tree().is_empty());
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_mesh_file_that_is_missing_is_named() {
     let mesh: Handle<Mesh> = app.world().resource::<AssetServer>().load("no-such-organ.glb#Mesh0/Primitive0");
     let organ = app.world_mut().spawn((Mesh3d(mesh), quick())).id();
     let error = failure(&mut app, organ).error;
-    assert!(matches!(error, OrganError::Mesh(OrganMeshError::NotLoaded { .. })), "{error}");
+    assert!(matches!(error, OrganGrowthError::Mesh(OrganMeshError::NotLoaded { .. })), "{error}");
     assert!(error.to_string().contains("no-such-organ.glb"), "{error}");
 }
 
@@ -103,7 +103,7 @@ fn roots_far_away_are_named() {
     let far = RootPlacement::Exact(vec![Vec3::new(1234.5, 0.0, 0.0)]);
     let organ = spawn(&mut app, quick().with_roots(far, RootPlacement::Beside));
     let error = failure(&mut app, organ).error;
-    assert!(matches!(error, OrganError::Growth(_)), "{error}");
+    assert!(matches!(error, OrganGrowthError::Growth(_)), "{error}");
     assert!(error.to_string().contains("1234.5"), "{error}");
     let mut wish = app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes");
     *wish = quick();

@@ -1,7 +1,9 @@
 //! An organ grows, and obeys.
 
 use crate::*;
-use bevy_vessels::plugin::{EntityCommandsExt, GrowthControl, GrowthFinished, GrowthFrame, GrowthStarted, diagnostics};
+use bevy_vessels::plugin::{
+    EntityCommandsExt, GrowthControl, GrowthFinished, GrowthFrame, GrowthStarted, growth::diagnostics,
+};
 
 #[test]
 fn an_organ_grows_over_frames_and_finishes() {
@@ -24,7 +26,7 @@ fn an_organ_grows_over_frames_and_finishes() {
     let progress = progress(app.world(), organ);
     assert_eq!((progress.phase, progress.fraction()), (GrowthPhase::Finished, 1.0));
     assert!(progress.grow_time > Duration::ZERO);
-    for system in System::ALL {
+    for system in VesselKind::ALL {
         assert_eq!(progress.nodes(system), published(app.world(), organ, system).tree().len());
         assert!(progress.nodes(system) > 50, "{system:?}: {progress:?}");
     }
@@ -135,14 +137,14 @@ fn a_restart_grows_the_same_vessels_on_the_same_entities() {
     let organ = spawn(&mut app, quick());
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     let before = trees(app.world(), organ);
-    let entity = vessel_entity(app.world(), organ, System::Arterial);
+    let entity = vessel_entity(app.world(), organ, VesselKind::Artery);
     send(&mut app, organ, GrowthAction::Restart);
     app.update();
     assert_eq!(progress(app.world(), organ).step, 9, "it restarts in the next frame, on the tissue at hand");
     assert_published(app.world(), organ);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     assert_eq!(before, trees(app.world(), organ));
-    assert_eq!(entity, vessel_entity(app.world(), organ, System::Arterial));
+    assert_eq!(entity, vessel_entity(app.world(), organ, VesselKind::Artery));
 }
 
 #[test]

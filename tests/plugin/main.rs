@@ -17,12 +17,12 @@ use bevy_vessels::{
     VesselPlugin,
     plugin::{
         GrowthAction, GrowthBudget, GrowthCommand, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthState,
-        OrganVessels, Vasculature, VesselSystem, Vessels,
+        OrganVessels, Vasculature, Vessels,
     },
     synthesis::{
         preset::PresetName,
         roots::RootPlacement,
-        tree::{System, VesselTree},
+        tree::{VesselKind, VesselTree},
     },
 };
 use std::{
@@ -102,19 +102,19 @@ fn drain<M: Message + Clone>(world: &World, cursor: &mut MessageCursor<M>) -> Ve
 }
 
 /// The vessel entity of a system.
-fn vessel_entity(world: &World, organ: Entity, system: System) -> Option<Entity> {
+fn vessel_entity(world: &World, organ: Entity, system: VesselKind) -> Option<Entity> {
     let vessels = world.get::<OrganVessels>(organ)?;
     vessels.entities().iter().copied().find(|&entity| world.get::<VesselSystem>(entity) == Some(&VesselSystem(system)))
 }
 
 /// A copy of what is published of a system.
-fn published(world: &World, organ: Entity, system: System) -> Vessels {
+fn published(world: &World, organ: Entity, system: VesselKind) -> Vessels {
     let entity = vessel_entity(world, organ, system).expect("the system has vessels");
     world.get::<Vessels>(entity).expect("a vessel entity has vessels").clone()
 }
 
 fn trees(world: &World, organ: Entity) -> [VesselTree; 2] {
-    System::ALL.map(|system| published(world, organ, system).tree().clone())
+    VesselKind::ALL.map(|system| published(world, organ, system).tree().clone())
 }
 
 /// Asserts that what is published is what the growth has, node by node.
@@ -122,7 +122,7 @@ fn trees(world: &World, organ: Entity) -> [VesselTree; 2] {
 fn assert_published(world: &World, organ: Entity) {
     let state = world.get::<GrowthState>(organ).expect("an organ has a state");
     let growth = state.growth().expect("the growth has started");
-    for system in System::ALL {
+    for system in VesselKind::ALL {
         let vessels = published(world, organ, system);
         assert_eq!(vessels.tree(), &growth.vessels(system), "{}", system.name());
         assert_eq!(vessels.birth_steps(), growth.birth_steps(system));

@@ -19,7 +19,7 @@ pub fn theatre(frame: Duration) -> App {
 }
 
 /// An organ with vessels of its own, each a tree for a system, without a mesh.
-pub fn organ_of(app: &mut App, trees: &[(System, &VesselTree)], components: impl Bundle) -> Entity {
+pub fn organ_of(app: &mut App, trees: &[(VesselKind, &VesselTree)], components: impl Bundle) -> Entity {
     let organ = app.world_mut().spawn((Transform::default(), Visibility::default(), components)).id();
     for &(system, tree) in trees {
         let relations = (ChildOf(organ), VesselsOf(organ));
@@ -56,7 +56,7 @@ pub fn square(center: Vec3, normal: Vec3, size: f32) -> Blade {
 }
 
 /// Clamps all segments that leave a root.
-pub fn clamp_roots(app: &mut App, organ: Entity, system: System) {
+pub fn clamp_roots(app: &mut App, organ: Entity, system: VesselKind) {
     let entity = vessel_entity(app.world(), organ, system).expect("the system has vessels");
     let tree = published(app.world(), organ, system).tree().clone();
     let first = tree.segments().filter(|&(_, parent)| tree.parents()[parent] == NO_PARENT);
@@ -73,12 +73,12 @@ pub fn cut(app: &mut App, blade: Blade) {
     operate(app, |vessels| vessels.cut(blade));
 }
 
-pub fn wounds(world: &World, organ: Entity, system: System) -> &VesselWounds {
+pub fn wounds(world: &World, organ: Entity, system: VesselKind) -> &VesselWounds {
     let vessels = vessel_entity(world, organ, system).expect("the system has vessels");
     world.get::<VesselWounds>(vessels).expect("the vessels can be cut")
 }
 
-pub fn severed(world: &World, organ: Entity, system: System) -> Vec<NodeId> {
+pub fn severed(world: &World, organ: Entity, system: VesselKind) -> Vec<NodeId> {
     wounds(world, organ, system).severed_segments().collect()
 }
 

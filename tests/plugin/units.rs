@@ -71,7 +71,7 @@ fn a_tree_bleeds_the_same_in_any_unit() {
             let radii = tree.radii().iter().map(|&radius| radius * factor).collect();
             VesselTree::from_arrays(positions, tree.parents().to_vec(), radii).expect("a tree")
         });
-        let of_systems = [(System::Arterial, &scaled[0]), (System::Venous, &scaled[1])];
+        let of_systems = [(VesselKind::Artery, &scaled[0]), (VesselKind::Vein, &scaled[1])];
         let organ = organ_of(&mut app, &of_systems, blood_in(units));
         bled(&mut app, organ, 0.5 * factor)
     });

@@ -4,7 +4,7 @@ use crate::{stage::*, tree};
 use bevy::prelude::*;
 use bevy_vessels::{
     render::SegmentChunk,
-    synthesis::tree::{NO_PARENT, System, VesselTree},
+    synthesis::tree::{NO_PARENT, VesselKind, VesselTree},
 };
 
 /// Vertical segments of one radius from left to right, each with a root of its own, `length` long.
@@ -34,7 +34,7 @@ fn scaled(stage: &mut Stage, organ: Entity, scale: f32) -> Picture {
 /// pictures for each change of level.
 fn changes_of_level(stage: &mut Stage) -> Vec<[Picture; 2]> {
     // a unit is a pixel; chunks get coarser a little below a limit and finer at it, so between the two both are drawn
-    let organ = stage.spawn(System::Arterial, &fence(40, 0.1, 4.0));
+    let organ = stage.spawn(VesselKind::Artery, &fence(40, 0.1, 4.0));
     let mut changes = Vec::new();
     let mut scale = 80.0;
     while scale > 0.3 {
@@ -78,7 +78,7 @@ fn a_change_of_level_is_hardly_seen_in_shadows() {
 #[test]
 fn near_vessels_have_all_their_corners_and_far_ones_few() {
     on_stage("near and far", |stage| {
-        let organ = stage.spawn(System::Arterial, &fence(3, 6.0, 60.0));
+        let organ = stage.spawn(VesselKind::Artery, &fence(3, 6.0, 60.0));
         scaled(stage, organ, 1.0);
         assert_eq!(level(stage, organ), 0);
         scaled(stage, organ, 0.08);
@@ -94,7 +94,7 @@ fn vessels_thinner_than_a_pixel_cover_what_they_should() {
     on_stage("coverage", |stage| {
         // a thousand segments, whose widths together are the share of the picture that is to be covered
         for radius in [0.02, 0.01, 0.005, 0.002] {
-            let organ = stage.spawn(System::Arterial, &fence(1000, radius, 60.0));
+            let organ = stage.spawn(VesselKind::Artery, &fence(1000, radius, 60.0));
             let covered = scaled(stage, organ, 1.0).vessel_pixels() as f32;
             let expected = 1000.0 * 2.0 * radius * 60.0;
             assert!((covered / expected - 1.0).abs() < 0.15, "radius {radius}: {covered} pixels, not {expected}");

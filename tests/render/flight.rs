@@ -17,7 +17,7 @@ use bevy_vessels::{
         preset::PresetName,
         roots::RootPlacement,
         tissue::TissueMode,
-        tree::System,
+        tree::VesselKind,
     },
 };
 
@@ -41,7 +41,7 @@ fn spawn_colon(stage: &mut Stage) -> (Colon, Transform) {
         let mut wish = Vasculature::new(PresetName::Colon)
             .with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()));
         wish.tissue.mode = TissueMode::Surface;
-        for system in System::ALL {
+        for system in VesselKind::ALL {
             wish.settings.system_mut(system).terminal_radius *= 1.4;
         }
         let mesh: Mesh = colon.mesh.part(side.clone()).into();

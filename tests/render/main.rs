@@ -21,9 +21,9 @@ use bevy::{
 };
 use bevy_vessels::{
     VesselPlugin,
-    plugin::{SegmentChanges, SegmentColoring, VesselAppearance, VesselSystem, Vessels, VesselsOf},
+    plugin::{SegmentChanges, SegmentColoring, VesselAppearance, Vessels, VesselsOf},
     render::{SegmentBuffer, SegmentLimits, SegmentMaterial},
-    synthesis::tree::{NO_PARENT, System, VesselTree},
+    synthesis::tree::{NO_PARENT, VesselKind, VesselTree},
 };
 use headless::headless_plugins;
 use stage::{Picture, SIZE, on_stage};
@@ -63,7 +63,7 @@ fn comb(count: usize) -> VesselTree {
 #[test]
 fn a_segment_is_where_it_belongs_and_as_thick_as_it_says() {
     on_stage("segment", |stage| {
-        stage.spawn(System::Arterial, &bar());
+        stage.spawn(VesselKind::Artery, &bar());
         let picture = stage.picture();
         assert!(picture.is_red(64, 64), "{:?}", picture.at(64, 64));
         for (x, y) in [(64, 64 - 12), (64, 64 + 12), (64 - 34, 64), (64 + 34, 64), (2, 2)] {
@@ -82,7 +82,7 @@ fn a_segment_is_where_it_belongs_and_as_thick_as_it_says() {
 fn radii_of_both_ends_are_respected() {
     on_stage("cone", |stage| {
         let cone = tree(&[([-40.0, 0.0, 0.0], NO_PARENT, 13.0), ([40.0, 0.0, 0.0], 0, 10.0)]);
-        stage.spawn(System::Arterial, &cone);
+        stage.spawn(VesselKind::Artery, &cone);
         let picture = stage.picture();
         assert_near(picture.height_at(64 - 38), 26, 2);
         assert_near(picture.height_at(64), 23, 2);
@@ -93,7 +93,7 @@ fn radii_of_both_ends_are_respected() {
 #[test]
 fn surfaces_face_outwards_and_are_lit_from_the_light() {
     on_stage("light", |stage| {
-        stage.spawn(System::Arterial, &bar());
+        stage.spawn(VesselKind::Artery, &bar());
         let picture = stage.picture();
         // the light comes from above and the camera's side
         let [top, middle, bottom] = [58, 64, 70].map(|y| picture.brightness(64, y));
@@ -105,7 +105,7 @@ fn surfaces_face_outwards_and_are_lit_from_the_light() {
 #[test]
 fn mirrored_and_stretched_organs_are_drawn_right() {
     on_stage("mirror", |stage| {
-        let organ = stage.spawn(System::Arterial, &bar());
+        let organ = stage.spawn(VesselKind::Artery, &bar());
         stage.set_transform(organ, Transform::from_scale(Vec3::new(-1.0, 1.0, 1.0)));
         let mirrored = stage.picture();
         assert_near(mirrored.height_at(64), 16, 2);
@@ -123,7 +123,7 @@ fn slots_without_a_segment_are_invisible() {
     on_stage("empty", |stage| {
         // a root and a child on the same spot; a chunk has 254 more slots, all empty, at the origin
         let nothing = tree(&[([0.0, 0.0, 0.0], NO_PARENT, 9.0), ([30.0, 0.0, 0.0], NO_PARENT, 9.0)]);
-        let organ = stage.spawn(System::Arterial, &nothing);
+        let organ = stage.spawn(VesselKind::Artery, &nothing);
         let picture = stage.picture();
         assert_eq!(picture.vessel_pixels(), 0);
         assert_eq!(stage.chunks(organ).len(), 1);
@@ -134,7 +134,7 @@ fn slots_without_a_segment_are_invisible() {
 fn growth_appears_through_range_writes_and_larger_buffers() {
     on_stage("growth", |stage| {
         let full = comb(CHUNK);
-        let organ = stage.spawn(System::Arterial, &comb(2));
+        let organ = stage.spawn(VesselKind::Artery, &comb(2));
         let before = stage.picture();
         // half of the comb is one chunk, all of it two: the second picture needs a larger buffer and a new chunk
         stage.replace(organ, &full, 4..full.len());
@@ -151,7 +151,7 @@ fn growth_appears_through_range_writes_and_larger_buffers() {
 #[test]
 fn only_marked_ranges_are_written_again() {
     on_stage("ranges", |stage| {
-        let organ = stage.spawn(System::Arterial, &comb(CHUNK));
+        let organ = stage.spawn(VesselKind::Artery, &comb(CHUNK));
         let before = stage.picture();
         // everything moved out of view, but only the second half was said to have changed
         let gone = tree(&vec![([500.0, 0.0, 0.0], NO_PARENT, 1.0); 2 * CHUNK]);
@@ -166,7 +166,7 @@ fn only_marked_ranges_are_written_again() {
 #[test]
 fn scattered_changes_reach_their_slots_and_no_others() {
     on_stage("scattered", |stage| {
-        let organ = stage.spawn(System::Arterial, &comb(28));
+        let organ = stage.spawn(VesselKind::Artery, &comb(28));
         let before = stage.picture();
         // all teeth but the first are moved out of view, and every third is said to have changed
         let mut nodes = vec![([500.0, 0.0, 0.0], NO_PARENT, 2.0); 56];
@@ -185,7 +185,7 @@ fn scattered_changes_reach_their_slots_and_no_others() {
 #[test]
 fn a_restart_clears_what_was_there() {
     on_stage("restart", |stage| {
-        let organ = stage.spawn(System::Arterial, &comb(CHUNK));
+        let organ = stage.spawn(VesselKind::Artery, &comb(CHUNK));
         stage.picture();
         stage.replace(organ, &bar(), 0..2);
         let picture = stage.picture();
@@ -201,7 +201,7 @@ fn a_restart_clears_what_was_there() {
 #[test]
 fn despawning_the_organ_removes_chunks_and_buffers() {
     on_stage("despawn", |stage| {
-        let organ = stage.spawn(System::Arterial, &bar());
+        let organ = stage.spawn(VesselKind::Artery, &bar());
         stage.picture();
         let before = stage.assets();
         assert_eq!(before, [1, 1], "a buffer and a material");
@@ -215,7 +215,7 @@ fn despawning_the_organ_removes_chunks_and_buffers() {
 #[test]
 fn losing_the_vessels_alone_removes_the_drawing() {
     on_stage("detach", |stage| {
-        let organ = stage.spawn(System::Arterial, &bar());
+        let organ = stage.spawn(VesselKind::Artery, &bar());
         stage.picture();
         let vessels = stage.vessels(organ);
         stage.app.world_mut().entity_mut(vessels).remove::<Vessels>();
@@ -227,7 +227,7 @@ fn losing_the_vessels_alone_removes_the_drawing() {
 #[test]
 fn systems_have_their_colours_and_can_be_hidden() {
     on_stage("systems", |stage| {
-        let organ = stage.spawn(System::Venous, &bar());
+        let organ = stage.spawn(VesselKind::Vein, &bar());
         let vein = stage.picture();
         assert!(vein.is_blue(64, 64), "{:?}", vein.at(64, 64));
         stage.appearance(organ, |look| look.venous = Color::srgb(0.1, 0.6, 0.1));
@@ -252,7 +252,7 @@ fn colours_tell_radius_age_and_order() {
             ([-50.0, -30.0, 0.0], NO_PARENT, 3.0),
             ([50.0, -30.0, 0.0], 4, 3.0),
         ];
-        let organ = stage.spawn_born(System::Arterial, &tree(&nodes), &[0, 40, 80, 80, 0, 1]);
+        let organ = stage.spawn_born(VesselKind::Artery, &tree(&nodes), &[0, 40, 80, 80, 0, 1]);
         let (trunk, thin) = ((40, 64 - 20), (64, 64 + 30));
         let mut seen = Vec::new();
         for coloring in [SegmentColoring::Radius, SegmentColoring::Age, SegmentColoring::StrahlerOrder] {
@@ -263,7 +263,7 @@ fn colours_tell_radius_age_and_order() {
             assert!(!seen.contains(&trunk), "{coloring:?} looks like another");
             seen.push(trunk);
         }
-        stage.appearance(organ, |look| look.coloring = SegmentColoring::System);
+        stage.appearance(organ, |look| look.coloring = SegmentColoring::Kind);
         let picture = stage.picture();
         assert!(picture.is_red(trunk.0, trunk.1) && picture.is_red(thin.0, thin.1));
     });
@@ -274,7 +274,7 @@ fn vessels_cast_shadows_and_receive_them() {
     on_stage("shadow", |stage| {
         stage.spawn_wall();
         let lit = stage.picture();
-        stage.spawn(System::Arterial, &bar());
+        stage.spawn(VesselKind::Artery, &bar());
         let shaded = stage.picture();
         // the light comes from above: the shadow on the wall behind lies below the vessel
         let darkest = (64 + 10..64 + 40).map(|y| shaded.brightness(64, y) / lit.brightness(64, y)).fold(1.0, f32::min);
@@ -287,7 +287,7 @@ fn vessels_cast_shadows_and_receive_them() {
 #[test]
 fn prepasses_see_the_same_surface() {
     on_stage("prepass", |stage| {
-        stage.spawn(System::Arterial, &bar());
+        stage.spawn(VesselKind::Artery, &bar());
         let forward = stage.picture();
         stage.with_on_camera((DepthPrepass, NormalPrepass, MotionVectorPrepass), |stage| {
             assert_looks_like(&stage.picture(), &forward);
@@ -298,7 +298,7 @@ fn prepasses_see_the_same_surface() {
 #[test]
 fn deferred_rendering_draws_the_same() {
     on_stage("deferred", |stage| {
-        stage.spawn(System::Arterial, &bar());
+        stage.spawn(VesselKind::Artery, &bar());
         let forward = stage.picture();
         stage.with_on_camera((DepthPrepass, DeferredPrepass), |stage| {
             stage.app.insert_resource(DefaultOpaqueRendererMethod::deferred());
@@ -314,7 +314,7 @@ fn boxes_follow_growth_so_that_nothing_in_view_is_culled() {
     on_stage("culling", |stage| {
         // the chunk begins far out of view; what grows into view last must be drawn
         let far = [([900.0, 0.0, 0.0], NO_PARENT, 1.0), ([910.0, 0.0, 0.0], 0, 1.0)];
-        let organ = stage.spawn(System::Arterial, &tree(&far));
+        let organ = stage.spawn(VesselKind::Artery, &tree(&far));
         assert_eq!(stage.picture().vessel_pixels(), 0);
         assert_eq!(stage.visible_chunks(), 0, "what is out of view is culled");
         let mut grown = far.to_vec();
@@ -331,7 +331,7 @@ fn boxes_follow_growth_so_that_nothing_in_view_is_culled() {
 #[test]
 fn nothing_is_done_when_nothing_changed() {
     on_stage("idle", |stage| {
-        let organ = stage.spawn(System::Arterial, &bar());
+        let organ = stage.spawn(VesselKind::Artery, &bar());
         stage.picture();
         let vessels = stage.vessels(organ);
         let world = stage.app.world();
@@ -347,7 +347,7 @@ fn nothing_is_done_when_nothing_changed() {
 #[test]
 fn users_can_change_the_material() {
     on_stage("material", |stage| {
-        let organ = stage.spawn(System::Arterial, &bar());
+        let organ = stage.spawn(VesselKind::Artery, &bar());
         let plain = stage.picture();
         let vessels = stage.vessels(organ);
         let material = stage.app.world().get::<SegmentBuffer>(vessels).expect("drawn").material().clone();
@@ -367,7 +367,8 @@ fn without_a_renderer_vessels_are_kept_and_nothing_is_drawn() {
     app.cleanup();
     let organ = app.world_mut().spawn((Transform::default(), Visibility::default(), VesselAppearance::default())).id();
     let tree = Vessels::from_tree(&bar(), &[]);
-    let vessels = app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(System::Arterial), tree)).id();
+    let vessels =
+        app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(VesselKind::Artery), tree)).id();
     app.update();
     app.update();
     assert!(app.world().get::<SegmentBuffer>(vessels).is_none());

@@ -19,9 +19,9 @@ use bevy::{
 };
 use bevy_vessels::{
     VesselPlugin,
-    plugin::{EntityCommandsExt, OrganVessels, SegmentChanges, VesselAppearance, VesselSystem, Vessels, VesselsOf},
+    plugin::{EntityCommandsExt, OrganVessels, SegmentChanges, VesselAppearance, Vessels, VesselsOf},
     render::{SegmentBuffer, SegmentChunk, SegmentMaterial},
-    synthesis::tree::{System, VesselTree},
+    synthesis::tree::{VesselKind, VesselTree},
 };
 use std::{
     any::Any,
@@ -148,12 +148,12 @@ impl Stage {
     }
 
     /// An organ with one system of vessels.
-    pub fn spawn(&mut self, system: System, tree: &VesselTree) -> Entity {
+    pub fn spawn(&mut self, system: VesselKind, tree: &VesselTree) -> Entity {
         self.spawn_born(system, tree, &[])
     }
 
     /// An organ with one system of vessels, born in the given steps.
-    pub fn spawn_born(&mut self, system: System, tree: &VesselTree, birth_steps: &[u32]) -> Entity {
+    pub fn spawn_born(&mut self, system: VesselKind, tree: &VesselTree, birth_steps: &[u32]) -> Entity {
         let world = self.app.world_mut();
         let look = VesselAppearance {
             arterial: Color::srgb(0.8, 0.05, 0.05),

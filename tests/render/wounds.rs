@@ -7,7 +7,7 @@ use crate::{
 use bevy::prelude::*;
 use bevy_vessels::{
     plugin::{Cuttable, CuttableVessels},
-    synthesis::{tree::System, wound::Blade},
+    synthesis::{tree::VesselKind, wound::Blade},
 };
 
 /// Lets an organ be cut, and draws it.
@@ -31,7 +31,7 @@ fn slash(through: Vec3, along: Vec3) -> Blade {
 #[test]
 fn a_severed_vessel_shows_its_gap_until_the_cut_is_undone() {
     on_stage("gap", |stage| {
-        let organ = stage.spawn(System::Arterial, &bar_of(3.0, 50.0));
+        let organ = stage.spawn(VesselKind::Artery, &bar_of(3.0, 50.0));
         let before = whole(stage, organ);
         assert!(before.is_vessel(64, 64));
         let cut = operate(stage, |vessels| vessels.cut(slash(Vec3::ZERO, Vec3::Y)));
@@ -47,7 +47,7 @@ fn a_severed_vessel_shows_its_gap_until_the_cut_is_undone() {
 #[test]
 fn many_pieces_have_room_and_boxes_of_their_own() {
     on_stage("pieces", |stage| {
-        let organ = stage.spawn(System::Venous, &comb(16));
+        let organ = stage.spawn(VesselKind::Vein, &comb(16));
         let before = whole(stage, organ);
         let rows = [-18.0, 0.0, 18.0];
         let cut = operate(stage, |vessels| {

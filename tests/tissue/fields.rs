@@ -207,7 +207,7 @@ fn impossible_settings_are_refused() -> Outcome {
         settings.build(&ball).err()
     };
     assert_eq!(with(|_| ()), None);
-    assert_eq!(with(|settings| settings.resolution = 0), Some(TissueError::NoResolution));
+    assert_eq!(with(|settings| settings.resolution = 0), Some(TissueError::Voxels(VoxelError::NoResolution)));
     assert!(matches!(with(|settings| settings.density = Some(vec![])), Some(TissueError::DensityCount { .. })));
     assert!(matches!(with(|settings| settings.guides.push(Guide::default())), Some(TissueError::GuidePoints { .. })));
     let sheet = grid(3, 1.0)?;

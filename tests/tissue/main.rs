@@ -9,7 +9,7 @@ use bevy_math::{
 };
 use bevy_vessels::synthesis::{
     mesh::TriangleMesh,
-    rng::{Stream, VesselRng},
+    random::{Stream, VesselRng},
     tissue::*,
 };
 use rand::RngExt;

@@ -193,7 +193,7 @@ fn closest_points_are_inside_and_near() -> Outcome {
         cuboid(Vec3::new(-0.1, -2.0, -0.1), Vec3::new(0.1, -1.5, 0.1))?,
     ])?;
     let volume = MeshVolume::new(&mesh, 48)?;
-    let surface = bevy_vessels::synthesis::tissue::TriangleIndex::new(&mesh);
+    let surface = bevy_vessels::synthesis::mesh::TriangleIndex::new(&mesh);
     let mut rng = rng(17);
     for _ in 0..3000 {
         let point = in_cube(&mut rng, 3.0);
@@ -223,9 +223,12 @@ fn what_encloses_nothing_is_refused() -> Outcome {
         }
     }
     let cube = unit_cube()?;
-    assert_eq!(MeshVolume::new(&cube, 0).err(), Some(TissueError::NoResolution));
+    assert_eq!(MeshVolume::new(&cube, 0).err(), Some(TissueError::Voxels(VoxelError::NoResolution)));
     for resolution in [1000, u32::MAX] {
-        assert!(matches!(MeshVolume::new(&cube, resolution), Err(TissueError::TooManyVoxels { .. })));
+        assert!(matches!(
+            MeshVolume::new(&cube, resolution),
+            Err(TissueError::Voxels(VoxelError::TooManyVoxels { .. }))
+        ));
     }
     Ok(())
 }

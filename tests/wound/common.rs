@@ -1,9 +1,9 @@
 //! Random trees and the slowest index there is.
 
 use bevy_math::{Vec3, vec3};
-use bevy_vessels::synthesis::rng::{Stream, VesselRng};
+use bevy_vessels::synthesis::random::{Stream, VesselRng};
+use bevy_vessels::synthesis::segment_index::Region;
 use bevy_vessels::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
-use bevy_vessels::synthesis::wound::Region;
 use rand::RngExt;
 
 pub fn rng(seed: u64) -> VesselRng {

@@ -2,9 +2,12 @@
 
 use crate::common::{all, forest, random_point, rng};
 use bevy_math::{Affine3A, DAffine3, DMat3, DVec3, Mat3, Quat, Vec3};
-use bevy_vessels::synthesis::rng::VesselRng;
+use bevy_vessels::synthesis::random::VesselRng;
 use bevy_vessels::synthesis::tree::VesselTree;
-use bevy_vessels::synthesis::wound::{Blade, BladeError, Region, Severed, severed};
+use bevy_vessels::synthesis::{
+    segment_index::Region,
+    wound::{Blade, BladeError, Severed, severed},
+};
 use rand::RngExt;
 
 /// A blade as the twin knows it, in world space.

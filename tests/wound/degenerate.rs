@@ -2,7 +2,7 @@
 
 use crate::common::{all, rng, tree};
 use bevy_math::{I64Vec3, Vec3, vec3};
-use bevy_vessels::synthesis::rng::VesselRng;
+use bevy_vessels::synthesis::random::VesselRng;
 use bevy_vessels::synthesis::tree::{NO_PARENT, VesselTree};
 use bevy_vessels::synthesis::wound::{Blade, Severed, severed};
 use rand::RngExt;

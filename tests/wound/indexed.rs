@@ -2,9 +2,12 @@
 
 use crate::common::{all, forest, random_point, rng};
 use bevy_math::{Affine3A, Mat3, Vec3};
-use bevy_vessels::synthesis::rng::VesselRng;
+use bevy_vessels::synthesis::random::VesselRng;
 use bevy_vessels::synthesis::tree::{NodeId, VesselTree};
-use bevy_vessels::synthesis::wound::{Blade, Region, SegmentIndex, Wounds};
+use bevy_vessels::synthesis::{
+    segment_index::{Region, SegmentIndex},
+    wound::{Blade, Wounds},
+};
 use rand::RngExt;
 
 fn by(index: &SegmentIndex) -> impl Fn(&Region, &mut dyn FnMut(NodeId)) + Copy {

@@ -1,10 +1,10 @@
 //! Thousands of random actions on a forest: after each, the reports add up to the state, and undo leads all the way back.
 
 use crate::common::{all, forest, random_point, rng};
-use bevy_vessels::synthesis::rng::VesselRng;
+use bevy_vessels::synthesis::random::VesselRng;
 use bevy_vessels::synthesis::tree::{NodeId, Place, VesselTree};
 use bevy_vessels::synthesis::wound::{
-    Blade, Blockage, ClampId, EndId, Piece, Retraction, SeveredEnd, WoundReport, Wounds, severed,
+    Blade, Blockage, ClampId, EndId, Retraction, SegmentPiece, SeveredEnd, WoundReport, Wounds, severed,
 };
 use rand::RngExt;
 use std::collections::BTreeSet;
@@ -33,7 +33,7 @@ impl Heard {
     }
 }
 
-type State = (Vec<SeveredEnd>, Vec<Blockage>, Vec<Piece>);
+type State = (Vec<SeveredEnd>, Vec<Blockage>, Vec<SegmentPiece>);
 
 fn state(wounds: &Wounds, tree: &VesselTree) -> State {
     let pieces = wounds.severed_segments().flat_map(|node| wounds.pieces(node)).collect();
@@ -97,7 +97,7 @@ fn assert_consistent(wounds: &Wounds, tree: &VesselTree, heard: &Heard) {
     assert_eq!(open, heard.open);
     assert!(heard.clamps.iter().all(|&clamp| wounds.clamp_place(clamp).is_some()));
     for node in wounds.severed_segments() {
-        let pieces: Vec<Piece> = wounds.pieces(node).collect();
+        let pieces: Vec<SegmentPiece> = wounds.pieces(node).collect();
         assert!(pieces.iter().all(|piece| 0.0 <= piece.from && piece.from < piece.to && piece.to <= 1.0));
         assert!(pieces.windows(2).all(|pair| pair[0].to <= pair[1].from), "{pieces:?}");
     }

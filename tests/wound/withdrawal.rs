@@ -4,10 +4,11 @@ use crate::common::{all, rng, tree};
 use bevy_math::{Vec3, vec3};
 use bevy_vessels::synthesis::haemodynamics::{FlowSettings, Network};
 use bevy_vessels::synthesis::instances::{SegmentColors, SegmentInstance, write_segments};
-use bevy_vessels::synthesis::rng::VesselRng;
+use bevy_vessels::synthesis::random::VesselRng;
 use bevy_vessels::synthesis::tree::{NO_PARENT, NodeId, Place, VesselTree};
-use bevy_vessels::synthesis::wound::{
-    Blade, EndSide, Retraction, SegmentIndex, SeveredEnd, WoundError, Wounds, write_stumps,
+use bevy_vessels::synthesis::{
+    segment_index::SegmentIndex,
+    wound::{Blade, EndSide, Retraction, SeveredEnd, WoundError, Wounds, write_stumps},
 };
 use rand::RngExt;
 

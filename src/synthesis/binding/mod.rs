@@ -18,9 +18,10 @@ mod surface;
 mod tetrahedra;
 mod vertices;
 
-pub use tetrahedra::{TetMesh, TetMeshError};
-
-use crate::synthesis::{mesh::TriangleMesh, tree::VesselTree};
+use crate::synthesis::{
+    mesh::{TetMesh, TriangleMesh},
+    tree::VesselTree,
+};
 use bevy_math::Vec3;
 use surface::SurfaceBonds;
 use tetrahedra::SolidBonds;

@@ -6,9 +6,8 @@ use super::{
     vertices::{Vertex, Vertices},
 };
 use crate::synthesis::{
-    mesh::{TriangleMesh, doubled_normal, unit},
+    mesh::{TriangleIndex, TriangleMesh, doubled_normal, unit},
     parallel,
-    tissue::TriangleIndex,
 };
 use bevy_math::{Vec3, Vec3A, Vec4};
 

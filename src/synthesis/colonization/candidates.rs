@@ -5,8 +5,8 @@
 
 use super::vacancy::Vacancy;
 use crate::synthesis::parallel;
-use crate::synthesis::rng::{Stream, VesselRng};
-use crate::synthesis::spatial_order::SpatialOrder;
+use crate::synthesis::random::{Stream, VesselRng};
+use crate::synthesis::space::order::SpatialOrder;
 use crate::synthesis::tissue::Tissue;
 use bevy_math::{Vec3, bounding::Aabb3d};
 

@@ -1,8 +1,8 @@
 //! The forest of one system while it grows: the tree, and what growth needs to know of each node beside it.
 
-use crate::synthesis::murray;
-use crate::synthesis::point_grid::PointGrid;
+use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::tissue::TissuePoint;
+use crate::synthesis::tree::murray;
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d, ops};
 

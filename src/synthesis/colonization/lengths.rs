@@ -1,8 +1,8 @@
 //! The settings of one system as a step uses them: lengths multiplied by λ_t, angles in radians and cosines.
 
 use super::settings::{AngleSpread, SystemSettings};
-use crate::synthesis::murray;
 use crate::synthesis::tissue::TissueGrowth;
+use crate::synthesis::tree::murray;
 use bevy_math::ops;
 use std::f32::consts::PI;
 

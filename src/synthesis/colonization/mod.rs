@@ -1,7 +1,7 @@
 //! Vessel growth by space colonization: drains pull, nodes follow, Murray's law sets radii and angles.
 //!
 //! In: a [`Tissue`], [`ColonizationSettings`], [`Roots`] and a seed. Out: two [`VesselTree`]s, arterial and venous, a
-//! little larger after each [`Growth::step`]. Source: Rauch & Harders, "Interactive Synthesis of 3D Geometries of Blood
+//! little larger after each [`Colonization::step`]. Source: Rauch & Harders, "Interactive Synthesis of 3D Geometries of Blood
 //! Vessels", Eurographics 2021 (short papers), section 3.
 //!
 //! A step samples the tissue for new oxygen drains, grows the arteries towards them, hands the drains that are now
@@ -11,10 +11,12 @@
 
 mod candidates;
 mod direction;
+mod drains;
 mod forest;
 mod lengths;
 mod perception;
-pub mod settings;
+pub mod seam;
+mod settings;
 mod step;
 mod system_growth;
 #[cfg(test)]
@@ -24,11 +26,10 @@ mod validity;
 
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
-use crate::synthesis::haemodynamics::BedLink;
 use crate::synthesis::parallel;
 use crate::synthesis::roots::{RootError, Roots};
 use crate::synthesis::tissue::{Tissue, TissuePoint};
-use crate::synthesis::tree::{NodeId, System, VesselTree};
+use crate::synthesis::tree::{BedLink, ByKind, NodeId, VesselKind, VesselTree};
 use bevy_math::Vec3;
 use candidates::{Candidates, Draws};
 use std::sync::Arc;
@@ -45,15 +46,10 @@ pub struct StepReport {
     pub sampled: u32,
     /// Candidates that became oxygen drains.
     pub born: u32,
-    /// What the arteries did, and the veins.
-    pub systems: [SystemReport; 2],
-}
-
-impl StepReport {
-    /// What the step did to one system.
-    pub fn system(&self, system: System) -> SystemReport {
-        self.systems[system.index()]
-    }
+    /// What the arteries did.
+    pub arterial: SystemReport,
+    /// What the veins did.
+    pub venous: SystemReport,
 }
 
 /// What one step did to one system.
@@ -71,7 +67,7 @@ pub struct SystemReport {
 
 /// Why growth could not start.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum GrowthError {
+pub enum ColonizationError {
     /// A setting outside its limits.
     #[error(transparent)]
     Settings(#[from] SettingsError),
@@ -83,12 +79,12 @@ pub enum GrowthError {
     NoArterialRoot,
 }
 
-/// A growth under way.
+/// A colonization under way.
 ///
 /// Make one with [`new`](Self::new), call [`step`](Self::step) until [`is_finished`](Self::is_finished), or
 /// [`run`](Self::run), and read [`tree`](Self::tree) or [`vessels`](Self::vessels) at any time between.
 #[derive(Debug)]
-pub struct Growth {
+pub struct Colonization {
     tissue: Arc<dyn Tissue>,
     settings: ColonizationSettings,
     systems: [SystemGrowth; 2],
@@ -103,7 +99,10 @@ pub struct Growth {
     links: Vec<BedLink>,
 }
 
-impl Growth {
+impl Colonization {
+    /// The kinds of vessels that colonization grows, in the order in which a step grows them.
+    pub const KINDS: [VesselKind; 2] = [VesselKind::Artery, VesselKind::Vein];
+
     /// Prepares a growth. Lengths in the settings are the tissue's: see [`ColonizationSettings::fit`].
     ///
     /// # Errors
@@ -113,11 +112,11 @@ impl Growth {
         settings: ColonizationSettings,
         roots: &Roots,
         seed: u64,
-    ) -> Result<Self, GrowthError> {
+    ) -> Result<Self, ColonizationError> {
         settings.validate()?;
         let placed = Self::placed(tissue.as_ref(), &settings, roots, seed)?;
         let bounds = tissue.bounds();
-        let systems = System::ALL.map(|system| SystemGrowth::new(settings.system(system), &bounds));
+        let systems = settings.systems().map(|(_, settings)| SystemGrowth::new(settings, &bounds));
         let mut growth = Self {
             tissue,
             settings,
@@ -139,12 +138,17 @@ impl Growth {
     ///
     /// # Errors
     /// As [`new`](Self::new); the growth is then as it was.
-    pub fn restart(&mut self, settings: ColonizationSettings, roots: &Roots, seed: u64) -> Result<(), GrowthError> {
+    pub fn restart(
+        &mut self,
+        settings: ColonizationSettings,
+        roots: &Roots,
+        seed: u64,
+    ) -> Result<(), ColonizationError> {
         settings.validate()?;
         let placed = Self::placed(self.tissue.as_ref(), &settings, roots, seed)?;
         let bounds = self.tissue.bounds();
-        for system in System::ALL {
-            self.systems[system.index()].restart(settings.system(system), &bounds);
+        for (system, (_, settings)) in self.systems.iter_mut().zip(settings.systems()) {
+            system.restart(settings, &bounds);
         }
         self.settings = settings;
         self.draws.restart(seed);
@@ -160,23 +164,22 @@ impl Growth {
         settings: &ColonizationSettings,
         roots: &Roots,
         seed: u64,
-    ) -> Result<[Vec<TissuePoint>; 2], GrowthError> {
-        let placed = roots.resolve(tissue, settings, seed)?;
-        let arteries = System::Arterial.index();
-        let given = roots.given[arteries].as_ref().is_some_and(|tree| !tree.is_empty());
-        if placed[arteries].is_empty() && !given { Err(GrowthError::NoArterialRoot) } else { Ok(placed) }
+    ) -> Result<ByKind<Vec<TissuePoint>>, ColonizationError> {
+        let placed = roots.resolve(tissue, &settings.root_spacing(), seed)?;
+        let given = roots.given.artery.as_ref().is_some_and(|tree| !tree.is_empty());
+        if placed.artery.is_empty() && !given { Err(ColonizationError::NoArterialRoot) } else { Ok(placed) }
     }
 
     fn reset_vacancy(&mut self) {
-        let arterial = self.settings.system(System::Arterial);
+        let arterial = &self.settings.arterial;
         let samples = u64::from(self.settings.steps) * u64::from(self.settings.samples);
         self.vacancy.reset([arterial.node_birth_distance, arterial.drain_birth_distance], samples);
     }
 
-    fn plant(&mut self, placed: &[Vec<TissuePoint>; 2], roots: &Roots) {
+    fn plant(&mut self, placed: &ByKind<Vec<TissuePoint>>, roots: &Roots) {
         let step = Step { tissue: self.tissue.as_ref(), settings: &self.settings, number: 1 };
-        for (index, system) in self.systems.iter_mut().enumerate() {
-            system.plant(&placed[index], roots.given[index].as_ref(), step.ground());
+        for (kind, system) in Self::KINDS.into_iter().zip(&mut self.systems) {
+            system.plant(&placed[kind], roots.given[kind].as_ref(), step.ground());
         }
     }
 
@@ -201,7 +204,7 @@ impl Growth {
         let venous = step.grow_veins(veins, arteries.supplied(), &mut self.links);
         let acted = born > 0 || arterial.new_nodes > 0 || venous.new_nodes > 0;
         self.idle = step.idle_after(self.idle, acted);
-        StepReport { step: step.number, sampled: self.settings.samples, born, systems: [arterial, venous] }
+        StepReport { step: step.number, sampled: self.settings.samples, born, arterial, venous }
     }
 
     /// Renews by Murray's law all radii that the steps since the last settling changed.
@@ -282,40 +285,41 @@ impl Growth {
         &self.tissue
     }
 
-    /// Centre lines of a system, on the tissue.
-    pub fn tree(&self, system: System) -> &VesselTree {
-        &self.forest(system).tree
+    /// Centre lines of a kind, on the tissue: an empty tree for kinds that colonization doesn't grow.
+    pub fn tree(&self, kind: VesselKind) -> &VesselTree {
+        static NONE: VesselTree = VesselTree::new();
+        self.system(kind).map_or(&NONE, |system| &system.forest.tree)
     }
 
     /// Normal of the tissue's surface at every node, zero in a volume.
-    pub fn normals(&self, system: System) -> &[Vec3] {
-        &self.forest(system).normals
+    pub fn normals(&self, kind: VesselKind) -> &[Vec3] {
+        self.system(kind).map_or(&[], |system| &system.forest.normals)
     }
 
     /// The step in which each node was born, 0 for those that growth began with.
-    pub fn birth_steps(&self, system: System) -> &[u32] {
-        &self.forest(system).birth_steps
+    pub fn birth_steps(&self, kind: VesselKind) -> &[u32] {
+        self.system(kind).map_or(&[], |system| &system.forest.birth_steps)
     }
 
     /// Nodes whose radius changed in the last step, or at the last [`settle`](Self::settle), new ones included, from the tips
     /// to the roots.
-    pub fn changed_radii(&self, system: System) -> &[u32] {
-        self.forest(system).changed()
+    pub fn changed_radii(&self, kind: VesselKind) -> &[u32] {
+        self.system(kind).map_or(&[], |system| system.forest.changed())
     }
 
-    /// Drains of a system that wait to be supplied.
-    pub fn drains(&self, system: System) -> impl Iterator<Item = Vec3> + '_ {
-        self.systems[system.index()].drains.living().map(|(_, position)| position)
+    /// Drains of a kind that wait to be supplied.
+    pub fn drains(&self, kind: VesselKind) -> impl Iterator<Item = Vec3> + '_ {
+        self.system(kind).into_iter().flat_map(|system| system.drains.living()).map(|(_, position)| position)
     }
 
-    /// Number of drains of a system that wait to be supplied.
-    pub fn drains_left(&self, system: System) -> usize {
-        self.systems[system.index()].drains.len()
+    /// Number of drains of a kind that wait to be supplied.
+    pub fn drains_left(&self, kind: VesselKind) -> usize {
+        self.system(kind).map_or(0, |system| system.drains.len())
     }
 
-    /// λ_t of a system: what its lengths are multiplied by at the present size of the tissue.
-    pub fn length_scale(&self, system: System) -> f32 {
-        self.systems[system.index()].length_scale()
+    /// λ_t of a kind: what its lengths are multiplied by at the present size of the tissue.
+    pub fn length_scale(&self, kind: VesselKind) -> f32 {
+        self.system(kind).map_or(1.0, SystemGrowth::length_scale)
     }
 
     /// Where blood comes over from the arteries to the veins: for each drain that both have supplied, the node of either
@@ -328,25 +332,19 @@ impl Growth {
     /// Where a node is drawn: lifted off the surface by its radius where the settings say so.
     ///
     /// # Panics
-    /// When the node is not of this system's tree.
-    pub fn lifted_position(&self, system: System, node: NodeId) -> Vec3 {
-        let forest = self.forest(system);
-        let (position, index) = (forest.tree.positions()[node.index()], node.index());
-        if self.settings.stand_off { position + forest.normals[index] * forest.tree.radii()[index] } else { position }
+    /// When the node is not of this kind's tree.
+    pub fn lifted_position(&self, kind: VesselKind, node: NodeId) -> Vec3 {
+        self.grown(kind).lifted_position(node)
     }
 
     /// The vessels as they are drawn and written: [`tree`](Self::tree) with every node at its
     /// [`lifted_position`](Self::lifted_position).
-    pub fn vessels(&self, system: System) -> VesselTree {
-        let mut vessels = self.tree(system).clone();
-        for (node, position) in vessels.positions_mut().iter_mut().enumerate() {
-            *position = self.lifted_position(system, NodeId(node as u32));
-        }
-        vessels
+    pub fn vessels(&self, kind: VesselKind) -> VesselTree {
+        self.grown(kind).vessels()
     }
 
-    fn forest(&self, system: System) -> &forest::Forest {
-        &self.systems[system.index()].forest
+    fn system(&self, kind: VesselKind) -> Option<&SystemGrowth> {
+        Self::KINDS.iter().position(|&grown| grown == kind).map(|index| &self.systems[index])
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::forest::Forest;
 use super::lengths::Lengths;
-use crate::synthesis::attraction::{Drains, Found, ON_THE_NODE, cos_at};
+use crate::synthesis::colonization::drains::{Drains, Found, ON_THE_NODE, cos_at};
 use crate::synthesis::parallel;
 use bevy_math::{Vec3, ops};
 

@@ -6,8 +6,9 @@
 
 pub use super::validity::{SettingsError, SettingsWarning};
 
+use crate::synthesis::roots::RootSpacing;
 use crate::synthesis::tissue::{Extent, TissueGrowth};
-use crate::synthesis::tree::System;
+use crate::synthesis::tree::{ByKind, VesselKind};
 
 /// Which measure of the spread of drains around a tip decides on a bifurcation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -231,20 +232,21 @@ impl ColonizationSettings {
     /// Most samples a step; more than this is surely a slip.
     pub const MAX_SAMPLES: u32 = 100_000_000;
 
-    /// The settings of one system.
-    pub fn system(&self, system: System) -> &SystemSettings {
-        match system {
-            System::Arterial => &self.arterial,
-            System::Venous => &self.venous,
-        }
+    /// The settings of both systems, arteries first.
+    pub fn systems(&self) -> [(VesselKind, &SystemSettings); 2] {
+        [(VesselKind::Artery, &self.arterial), (VesselKind::Vein, &self.venous)]
     }
 
-    /// The settings of one system, to change them.
-    pub fn system_mut(&mut self, system: System) -> &mut SystemSettings {
-        match system {
-            System::Arterial => &mut self.arterial,
-            System::Venous => &mut self.venous,
-        }
+    /// The settings of the system of a kind; `None` for kinds that colonization doesn't grow.
+    pub fn system(&self, kind: VesselKind) -> Option<&SystemSettings> {
+        self.systems().into_iter().find(|&(own, _)| own == kind).map(|(_, settings)| settings)
+    }
+
+    /// What the placement of roots needs to know.
+    pub fn root_spacing(&self) -> ByKind<Option<RootSpacing>> {
+        ByKind::from_fn(|kind| {
+            self.system(kind).map(|system| RootSpacing { step: system.step_length, reach: system.influence_distance })
+        })
     }
 
     /// Multiplies every length of both systems by `factor`.

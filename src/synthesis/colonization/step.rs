@@ -4,9 +4,8 @@ use super::candidates::{Candidates, Draws};
 use super::system_growth::{Ground, Supplied, SystemGrowth};
 use super::vacancy::Vacancy;
 use super::{ColonizationSettings, SystemReport};
-use crate::synthesis::haemodynamics::BedLink;
 use crate::synthesis::tissue::{Extent, Tissue};
-use crate::synthesis::tree::System;
+use crate::synthesis::tree::BedLink;
 
 /// A step, which may be taken part by part.
 #[derive(Clone, Copy, Debug)]
@@ -84,8 +83,7 @@ impl<'a> Step<'a> {
     /// Number of steps in a row that brought nothing, given the one before this and whether this `acted`. Steps do not count
     /// as long as tissue that grows or changes may need more vessels.
     pub fn idle_after(self, idle: u32, acted: bool) -> u32 {
-        let is_over = |&system: &System| self.settings.system(system).tissue_growth.is_over(self.number);
-        let settled = System::ALL.iter().all(is_over);
+        let settled = self.settings.systems().iter().all(|(_, system)| system.tissue_growth.is_over(self.number));
         if acted || !settled || self.tissue.stage(self.number).is_some() { 0 } else { idle + 1 }
     }
 }

@@ -17,16 +17,16 @@ fn roots() -> Roots {
     }
 }
 
-fn growth(settings: ColonizationSettings) -> Growth {
-    Growth::new(disc(), settings, &roots(), 3).expect("valid settings")
+fn growth(settings: ColonizationSettings) -> Colonization {
+    Colonization::new(disc(), settings, &roots(), 3).expect("valid settings")
 }
 
 /// What must hold of both trees after every step.
-fn assert_sound(growth: &Growth) {
-    for system in System::ALL {
+fn assert_sound(growth: &Colonization) {
+    for system in Colonization::KINDS {
         let tree = growth.tree(system);
         tree.validate().expect("a well-formed tree");
-        let residual = tree.murray_residual(growth.settings().system(system).bifurcation_exponent);
+        let residual = tree.murray_residual(growth.settings().system(system).expect("grown").bifurcation_exponent);
         assert!(residual <= 1e-5, "{} residual {residual}", system.name());
         assert_eq!(growth.normals(system).len(), tree.len());
         assert_eq!(growth.birth_steps(system).len(), tree.len());
@@ -48,14 +48,14 @@ fn association_equals_its_brute_force_twin_at_every_step() {
             settings.arterial.lateral_sprouts = false;
             settings.venous.root_children = 5;
         }
-        let mut growth = Growth::new(tissue, settings, &roots(), 5).expect("valid settings");
+        let mut growth = Colonization::new(tissue, settings, &roots(), 5).expect("valid settings");
         while !growth.is_finished() {
             growth.step();
             for system in &mut growth.systems {
                 system.assert_association_exact();
             }
         }
-        assert!(growth.tree(System::Arterial).len() > 20, "case {case}: {}", growth.tree(System::Arterial).len());
+        assert!(growth.tree(VesselKind::Artery).len() > 20, "case {case}: {}", growth.tree(VesselKind::Artery).len());
     }
 }
 
@@ -63,7 +63,7 @@ fn association_equals_its_brute_force_twin_at_every_step() {
 fn a_growth_without_samples_or_drains_rests() {
     let mut growth = growth(ColonizationSettings { samples: 0, ..ColonizationSettings::default() });
     growth.run();
-    assert_eq!(growth.tree(System::Arterial).len(), 1);
+    assert_eq!(growth.tree(VesselKind::Artery).len(), 1);
     assert_eq!(growth.steps_done(), 100);
     assert!(growth.is_finished());
     assert_eq!(growth.step().systems, [SystemReport::default(); 2]);
@@ -72,7 +72,7 @@ fn a_growth_without_samples_or_drains_rests() {
 #[test]
 fn a_full_tissue_ends_growth_early_and_loses_nothing_by_it() {
     let mut settings = ColonizationSettings { steps: 3000, ..ColonizationSettings::default() };
-    for system in System::ALL {
+    for system in Colonization::KINDS {
         settings.system_mut(system).tissue_growth = TissueGrowth::None;
     }
     let mut ended = growth(settings.clone());
@@ -86,7 +86,7 @@ fn a_full_tissue_ends_growth_early_and_loses_nothing_by_it() {
     let mut whole = growth(ColonizationSettings { idle_steps: 0, ..settings.clone() });
     whole.run();
     assert_eq!((stepped.steps_done(), whole.steps_done()), (steps, 3000));
-    for system in System::ALL {
+    for system in Colonization::KINDS {
         assert_eq!(ended.tree(system), stepped.tree(system));
         // Some last gaps are smaller than the samples of the idle steps could find.
         let (nodes, all) = (ended.tree(system).len(), whole.tree(system).len());
@@ -95,13 +95,14 @@ fn a_full_tissue_ends_growth_early_and_loses_nothing_by_it() {
     // Where tissue grows there is always something to do again.
     settings.steps = 60;
     settings.arterial.tissue_growth = TissueGrowth::Table(vec![1.0; 60]);
-    let mut growing = Growth::new(disc(), ColonizationSettings { samples: 0, ..settings }, &roots(), 3).expect("valid");
+    let mut growing =
+        Colonization::new(disc(), ColonizationSettings { samples: 0, ..settings }, &roots(), 3).expect("valid");
     growing.run();
     assert_eq!(growing.steps_done(), 60);
 }
 
 /// A growth whose only drains are these.
-fn pulled_by(drains: &[Vec3], change: impl Fn(&mut ColonizationSettings)) -> Growth {
+fn pulled_by(drains: &[Vec3], change: impl Fn(&mut ColonizationSettings)) -> Colonization {
     let mut settings =
         ColonizationSettings { samples: 0, steps: 40, confine: false, ..ColonizationSettings::default() };
     change(&mut settings);
@@ -140,7 +141,7 @@ fn drains_in_awkward_places_do_no_harm() {
 fn opposite_drains_leave_a_root_at_rest() {
     let root = Vec3::new(-0.5, 0.0, 0.0);
     let growth = pulled_by(&[root + Vec3::Y * 0.04, root - Vec3::Y * 0.04], |_| {});
-    assert_eq!(growth.tree(System::Arterial).len(), 1);
+    assert_eq!(growth.tree(VesselKind::Artery).len(), 1);
 }
 
 #[test]
@@ -151,7 +152,7 @@ fn a_node_that_would_lie_on_another_is_not_made() {
         settings.arterial.perception_angle = 360.0;
         settings.arterial.tissue_growth = TissueGrowth::None;
     });
-    let positions = growth.tree(System::Arterial).positions();
+    let positions = growth.tree(VesselKind::Artery).positions();
     for (i, a) in positions.iter().enumerate() {
         assert!(positions[..i].iter().all(|b| a.distance(*b) > 1e-5));
     }
@@ -163,8 +164,8 @@ fn leaf_only_development_never_sprouts_sideways() {
     settings.arterial.lateral_sprouts = false;
     let mut growth = growth(settings);
     growth.run();
-    let tree = growth.tree(System::Arterial);
-    let births = growth.birth_steps(System::Arterial);
+    let tree = growth.tree(VesselKind::Artery);
+    let births = growth.birth_steps(VesselKind::Artery);
     let children = tree.children();
     for node in 0..tree.len() {
         // A root is no inter-node: its vessels may leave it at any time.
@@ -181,18 +182,18 @@ fn leaf_only_development_never_sprouts_sideways() {
 fn growth_goes_on_from_a_given_tree() {
     let mut first = growth(ColonizationSettings { steps: 30, ..ColonizationSettings::default() });
     first.run();
-    let given = first.tree(System::Arterial).clone();
+    let given = first.tree(VesselKind::Artery).clone();
     let mut roots = roots();
     roots.arterial = RootPlacement::None;
     roots.given = [Some(given.clone()), None];
-    let mut second = Growth::new(disc(), ColonizationSettings::default(), &roots, 9).expect("valid settings");
-    assert_eq!(second.tree(System::Arterial).positions(), given.positions());
-    for (radius, expected) in second.tree(System::Arterial).radii().iter().zip(given.radii()) {
+    let mut second = Colonization::new(disc(), ColonizationSettings::default(), &roots, 9).expect("valid settings");
+    assert_eq!(second.tree(VesselKind::Artery).positions(), given.positions());
+    for (radius, expected) in second.tree(VesselKind::Artery).radii().iter().zip(given.radii()) {
         assert!((radius / expected - 1.0).abs() < 1e-4, "{radius} against {expected}");
     }
     second.run();
     assert_sound(&second);
-    let tree = second.tree(System::Arterial);
+    let tree = second.tree(VesselKind::Artery);
     assert!(tree.len() > 2 * given.len());
     assert_eq!(tree.parents()[..given.len()], *given.parents());
 }
@@ -200,10 +201,10 @@ fn growth_goes_on_from_a_given_tree() {
 #[test]
 fn growth_needs_an_arterial_root_and_names_it() {
     let none = Roots { arterial: RootPlacement::None, ..roots() };
-    let error = Growth::new(disc(), ColonizationSettings::default(), &none, 1).expect_err("no root");
+    let error = Colonization::new(disc(), ColonizationSettings::default(), &none, 1).expect_err("no root");
     assert!(error.to_string().contains("no root"));
     let wrong = ColonizationSettings { steps: 0, ..ColonizationSettings::default() };
-    let error = Growth::new(disc(), wrong, &roots(), 1).expect_err("no steps");
+    let error = Colonization::new(disc(), wrong, &roots(), 1).expect_err("no steps");
     assert!(error.to_string().contains("steps is 0"));
 }
 
@@ -211,10 +212,10 @@ fn growth_needs_an_arterial_root_and_names_it() {
 fn a_failed_restart_leaves_the_growth_as_it_was() {
     let mut growth = growth(ColonizationSettings { steps: 20, ..ColonizationSettings::default() });
     growth.run();
-    let before = growth.tree(System::Arterial).clone();
+    let before = growth.tree(VesselKind::Artery).clone();
     let none = Roots { arterial: RootPlacement::None, ..roots() };
     assert!(growth.restart(ColonizationSettings::default(), &none, 1).is_err());
-    assert_eq!(growth.tree(System::Arterial), &before);
+    assert_eq!(growth.tree(VesselKind::Artery), &before);
 }
 
 #[test]
@@ -223,7 +224,7 @@ fn changed_radii_are_those_that_changed() {
     let mut before: [Vec<f32>; 2] = Default::default();
     while !growth.is_finished() {
         growth.step();
-        for system in System::ALL {
+        for system in Colonization::KINDS {
             let radii = growth.tree(system).radii();
             let old = &mut before[system.index()];
             let mut changed: Vec<u32> = growth.changed_radii(system).to_vec();
@@ -247,7 +248,7 @@ fn changed_radii_are_those_that_changed() {
 fn blood_comes_over_where_both_systems_supplied_a_drain() {
     let mut growth = growth(ColonizationSettings::default());
     growth.run();
-    let (arteries, veins) = (growth.tree(System::Arterial).positions(), growth.tree(System::Venous).positions());
+    let (arteries, veins) = (growth.tree(VesselKind::Artery).positions(), growth.tree(VesselKind::Vein).positions());
     let reach = SystemSettings::DEFAULT_INFLUENCE_DISTANCE * 3.5;
     assert!(growth.bed_links().len() > veins.len() / 4, "{} links", growth.bed_links().len());
     for link in growth.bed_links() {

@@ -1,18 +1,18 @@
 //! Which parts of the tissue can still take a drain, so that candidates are drawn from these alone.
 //!
 //! As tissue fills, nearly every candidate is refused: it lies within the birth distance of a node or of a drain. The tissue
-//! is cut into small [pieces](Piece), and a piece that lies wholly within the reach of one of these *blockers* can take no
+//! is cut into small [pieces](TissuePiece), and a piece that lies wholly within the reach of one of these *blockers* can take no
 //! drain. Of the samples of a step, as many are drawn from the other pieces as would have fallen there: one in so many each,
 //! as their share of the tissue says. What is accepted is distributed as if all samples had been drawn.
 //!
 //! Blockers' reaches shrink with λ. Every piece remembers at which λ its nodes, and one of its drains, let go of it. Pieces
 //! are looked over whenever λ has shrunk by a little, and count as blocked only if they stay so until the next time.
 
-use crate::synthesis::alias::AliasTable;
-use crate::synthesis::draws;
-use crate::synthesis::point_grid::PointGrid;
-use crate::synthesis::rng::VesselRng;
-use crate::synthesis::tissue::{Extent, Piece, Tissue};
+use crate::synthesis::random::VesselRng;
+use crate::synthesis::random::alias_table::AliasTable;
+use crate::synthesis::random::many;
+use crate::synthesis::space::point_grid::PointGrid;
+use crate::synthesis::tissue::{Extent, Tissue, TissuePiece};
 use bevy_math::Vec3;
 
 /// Reach of a piece as a share of the smaller radius of the blockers, when pieces are cut.
@@ -38,7 +38,7 @@ pub(crate) struct Vacancy {
     /// The λ for which the pieces were cut, and that at which they are looked over next. Nought before the first time.
     cut_at: f32,
     until: f32,
-    pieces: Vec<Piece>,
+    pieces: Vec<TissuePiece>,
     /// Index over the pieces' centres.
     index: PointGrid,
     /// The reach for which pieces were cut.
@@ -200,14 +200,14 @@ impl Vacancy {
     /// There must be pieces.
     pub fn draw(&self, tissue: &dyn Tissue, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
         let share = self.listed_measure / self.whole;
-        let falling = if share < 1.0 { draws::count_below(rng, count, share) } else { count };
+        let falling = if share < 1.0 { many::count_below(rng, count, share) } else { count };
         let slots = self.listed.len() as u32;
-        draws::each(rng, falling, |[slot, keep, x, y, z]| {
-            let slot = draws::below(slot, slots);
-            let slot = if self.even { slot } else { self.shares.pick(slot, draws::unit(keep)) };
+        many::each(rng, falling, |[slot, keep, x, y, z]| {
+            let slot = many::below(slot, slots);
+            let slot = if self.even { slot } else { self.shares.pick(slot, many::unit(keep)) };
             let piece = self.listed[slot as usize] as usize;
             if !self.blocked[piece].until(self.until) {
-                let numbers = [x, y, z].map(draws::unit);
+                let numbers = [x, y, z].map(many::unit);
                 candidates.extend(tissue.point_of(self.reach, self.pieces[piece].id, numbers));
             }
         });
@@ -218,7 +218,7 @@ impl Vacancy {
 mod tests {
     use super::*;
     use crate::synthesis::mesh::TriangleMesh;
-    use crate::synthesis::rng::Stream;
+    use crate::synthesis::random::Stream;
     use crate::synthesis::tissue::{DensityField, DensityTissue, Disc, MeshSurface, Rectangle};
     use bevy_math::Vec2;
     use std::sync::Arc;
@@ -254,8 +254,8 @@ mod tests {
                 let mut rng = Stream::Statistics.rng(1);
                 for piece in &pieces {
                     assert!(piece.reach <= 1.02 * reach, "case {case}: a piece reaches {} of {reach}", piece.reach);
-                    draws::each(&mut rng, 8, |words: [u32; 3]| {
-                        let Some(point) = tissue.point_of(reach, piece.id, words.map(draws::unit)) else { return };
+                    many::each(&mut rng, 8, |words: [u32; 3]| {
+                        let Some(point) = tissue.point_of(reach, piece.id, words.map(many::unit)) else { return };
                         assert!(tissue.contains(point), "case {case}: {point} is not in the tissue");
                         assert!(point.distance(piece.center) <= piece.reach * 1.001 + 1e-6, "case {case}, {piece:?}");
                     });

@@ -1,7 +1,7 @@
 //! The limits of the settings, and warnings of combinations with known artefacts.
 
 use super::settings::{ColonizationSettings, SystemSettings};
-use crate::synthesis::tree::System;
+use crate::synthesis::tree::VesselKind;
 use std::fmt;
 
 /// A setting that growth cannot start with.
@@ -49,7 +49,7 @@ pub enum SettingsWarning {
     /// Vessels overshoot the drains they grow to and collide.
     StepExceedsKill {
         /// The system in question.
-        system: System,
+        system: VesselKind,
         /// Its step length.
         step: f32,
         /// Its kill distance.
@@ -58,7 +58,7 @@ pub enum SettingsWarning {
     /// Drains count as supplied further away than they are heard.
     InfluenceBelowKill {
         /// The system in question.
-        system: System,
+        system: VesselKind,
         /// Its influence distance.
         influence: f32,
         /// Its kill distance.
@@ -67,21 +67,21 @@ pub enum SettingsWarning {
     /// Vessels bend back on themselves.
     WidePerception {
         /// The system in question.
-        system: System,
+        system: VesselKind,
         /// Its perception angle in degrees.
         degrees: f32,
     },
     /// Vessels grow straight past what they should supply.
     StrongDirection {
         /// The system in question.
-        system: System,
+        system: VesselKind,
         /// Its direction weight.
         weight: f32,
     },
     /// Drains are born within the distance at which they are removed.
     BirthBelowKill {
         /// The system in question.
-        system: System,
+        system: VesselKind,
         /// Its birth distance to nodes.
         birth: f32,
         /// Its kill distance.
@@ -140,16 +140,16 @@ impl ColonizationSettings {
             return count("samples", self.samples, "at most 100000000");
         }
         let mut warnings = Vec::new();
-        for system in System::ALL {
-            self.system(system).check(system, self.steps)?;
-            self.system(system).warn(system, &mut warnings);
+        for (kind, system) in self.systems() {
+            system.check(kind, self.steps)?;
+            system.warn(kind, &mut warnings);
         }
         Ok(warnings)
     }
 }
 
 impl SystemSettings {
-    fn check(&self, system: System, steps: u32) -> Result<(), SettingsError> {
+    fn check(&self, system: VesselKind, steps: u32) -> Result<(), SettingsError> {
         let range = |name, value: f32, ok: bool, limits| {
             if ok { Ok(()) } else { Err(SettingsError::OutOfRange { system: system.name(), name, value, limits }) }
         };
@@ -181,7 +181,7 @@ impl SystemSettings {
         })
     }
 
-    fn warn(&self, system: System, warnings: &mut Vec<SettingsWarning>) {
+    fn warn(&self, system: VesselKind, warnings: &mut Vec<SettingsWarning>) {
         let kill = self.kill_distance;
         if self.step_length > kill {
             warnings.push(SettingsWarning::StepExceedsKill { system, step: self.step_length, kill });

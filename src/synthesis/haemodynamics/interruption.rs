@@ -1,7 +1,7 @@
 //! Cuts and clamps, laid over the tree.
 
 use super::{
-    EndSide, FlowError, Network, OpenEnd,
+    EndSide, FlowError, Network, NetworkEnd,
     network::{CLOSED, REFERENCE, SOURCE, node_slot},
 };
 use crate::synthesis::tree::NodeId;
@@ -214,11 +214,11 @@ impl Network {
 }
 
 /// The open ends of a gap, not measured yet.
-fn ends_of(node: NodeId, interruption: Option<Interruption>) -> [Option<OpenEnd>; 2] {
+fn ends_of(node: NodeId, interruption: Option<Interruption>) -> [Option<NetworkEnd>; 2] {
     interruption.map_or([None; 2], |gap| {
         [
-            gap.proximal.map(|outlet| OpenEnd::new(node, EndSide::Proximal, gap.first, outlet)),
-            gap.distal.map(|outlet| OpenEnd::new(node, EndSide::Distal, gap.last, outlet)),
+            gap.proximal.map(|outlet| NetworkEnd::new(node, EndSide::Proximal, gap.first, outlet)),
+            gap.distal.map(|outlet| NetworkEnd::new(node, EndSide::Distal, gap.last, outlet)),
         ]
     })
 }

@@ -17,17 +17,7 @@
 //! the pool's. Open ends are solved for by Newton's method around it, as in a single tree.
 
 use super::{FlowError, Network, open_ends::OpenEnds, side::Side};
-use crate::synthesis::tree::NodeId;
-
-/// A stretch of capillary bed between an artery and a vein.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
-pub struct BedLink {
-    /// The node that gives blood.
-    pub arterial: NodeId,
-    /// The node that takes it.
-    pub venous: NodeId,
-}
+use crate::synthesis::tree::BedLink;
 
 /// Arteries and veins of an organ, joined through the bed.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! Blood flow: pressure, flow, velocity and wall shear stress in every segment of a tree.
 //!
 //! In: a [`VesselTree`](crate::synthesis::tree::VesselTree), [`FlowSettings`] and the [`Interruption`]s that cuts and
-//! clamps made. Out: a [`Network`] that holds pressures and flows by node, and the flow at every [`OpenEnd`].
+//! clamps made. Out: a [`Network`] that holds pressures and flows by node, and the flow at every [`NetworkEnd`].
 //!
 //! # Model
 //!
@@ -38,9 +38,13 @@
 //! Source: Poiseuille networks as in Pries et al. (1994) and Rauch & Harders (2021); the orifice law with the
 //! coefficient of PMID 22166236.
 
+pub mod bleeding;
+pub mod blood_volume;
+pub mod clotting;
 mod error;
 mod exponential;
 mod interruption;
+pub mod ischaemia;
 mod joined;
 mod network;
 mod open_ends;
@@ -52,10 +56,14 @@ mod solution;
 mod sweeps;
 mod viscosity;
 
+pub use bleeding::{Bleeding, BleedingChange, BleedingEnd, BleedingSettings, EndState};
+pub use blood_volume::{BloodVolume, BloodVolumeSettings};
+pub use clotting::Clotting;
 pub use error::FlowError;
 pub use interruption::{Interruption, Outlet};
-pub use joined::{BedLink, Circulation};
+pub use ischaemia::{Supply, TissueSupply};
+pub use joined::Circulation;
 pub use network::{Network, NetworkUpdate};
-pub use open_ends::{EndSide, OpenEnd};
+pub use open_ends::{EndSide, NetworkEnd};
 pub use settings::{BedSettings, FlowSettings, Pulse, RootPressure};
 pub use viscosity::{ViscosityLaw, relative_viscosity};

@@ -21,7 +21,7 @@ pub enum EndSide {
 
 /// One open end of a severed vessel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OpenEnd {
+pub struct NetworkEnd {
     /// End node of the severed segment.
     pub node: NodeId,
     /// Which end of the gap.
@@ -50,7 +50,7 @@ pub struct OpenEnd {
     pub(super) stump: Shunt,
 }
 
-impl OpenEnd {
+impl NetworkEnd {
     /// An end that has not been measured.
     pub(super) fn new(node: NodeId, side: EndSide, along: f32, outlet: Outlet) -> Self {
         Self {
@@ -123,7 +123,7 @@ impl OpenEnd {
 #[derive(Clone, Debug, Default)]
 pub(super) struct OpenEnds {
     /// In the order of the node, proximal before distal.
-    list: Vec<OpenEnd>,
+    list: Vec<NetworkEnd>,
     pub skeleton: Skeleton,
     /// Whether the skeleton has to be traced again.
     pub is_untraced: bool,
@@ -144,7 +144,7 @@ impl OpenEnds {
     /// Flow that counts as none, relative to the largest.
     const NEGLIGIBLE: f64 = 1e-14;
 
-    pub fn all(&self) -> &[OpenEnd] {
+    pub fn all(&self) -> &[NetworkEnd] {
         &self.list
     }
 
@@ -154,9 +154,9 @@ impl OpenEnds {
     }
 
     /// Puts ends in the place of all that a segment had. One that is the same keeps its state.
-    pub fn replace(&mut self, node: NodeId, ends: [Option<OpenEnd>; 2]) {
+    pub fn replace(&mut self, node: NodeId, ends: [Option<NetworkEnd>; 2]) {
         let indices = self.indices_of(node);
-        let kept = |end: OpenEnd| {
+        let kept = |end: NetworkEnd| {
             let before = self.list[indices.clone()].iter().find(|before| before.is_same(&end));
             let mut end = before.copied().unwrap_or(end);
             // The network below it is another one now.
@@ -175,7 +175,7 @@ impl OpenEnds {
 
     /// Puts ends in the place of all that there are, in the order of the node, proximal before distal. One that is the same
     /// keeps its state; those of `changed` segments, which are in rising order, draw nothing until they are solved for.
-    pub fn replace_all(&mut self, ends: Vec<OpenEnd>, changed: &[NodeId]) {
+    pub fn replace_all(&mut self, ends: Vec<NetworkEnd>, changed: &[NodeId]) {
         let mut before = std::mem::replace(&mut self.list, ends).into_iter().peekable();
         let mut changed = changed.iter().peekable();
         for end in &mut self.list {
@@ -275,7 +275,7 @@ impl OpenEnds {
 
     /// Takes the flows that follow from the pressures of a linearised solution, which are above that outside and exact to
     /// `rounding`. Returns the largest change of a flow, in units of what is tolerated.
-    pub fn accept(&mut self, pressure: impl Fn(&OpenEnd) -> f64, rounding: f64, damped: bool) -> f64 {
+    pub fn accept(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, rounding: f64, damped: bool) -> f64 {
         let largest = self.list.iter().map(|end| end.flow).fold(0.0, f64::max);
         let mut residual = 0.0_f64;
         for end in &mut self.list {
@@ -294,7 +294,7 @@ impl OpenEnds {
 
     /// Pressures, and what the ends draw as conductances to the outside, by pressures above the bed's. The pressures of
     /// the solution are above that outside.
-    pub fn finish(&mut self, pressure: impl Fn(&OpenEnd) -> f64, ambient: f64, bed: f64) {
+    pub fn finish(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, ambient: f64, bed: f64) {
         for end in &mut self.list {
             let difference = pressure(end);
             let is_open = end.flow > 0.0 && difference > 0.0;
@@ -327,7 +327,7 @@ impl Network {
     }
 
     fn measure_end(&mut self, index: usize) {
-        let OpenEnd { node, side, along, .. } = self.ends.list[index];
+        let NetworkEnd { node, side, along, .. } = self.ends.list[index];
         let whole = self.whole_resistance(node.index());
         let slot = node_slot(node.index());
         let (attached, share) = match side {

@@ -48,6 +48,10 @@ impl FlowSettings {
     pub const DEFAULT_ARTERIAL_PRESSURE: f64 = 95.0;
     /// Default of the root pressure of veins, in mmHg: the textbook has 0 to 4 in the vena cava.
     pub const DEFAULT_VENOUS_PRESSURE: f64 = 4.0;
+    /// Default pressure at the root of portal veins, in mmHg: the textbook has 5 to 10.
+    pub const DEFAULT_PORTAL_PRESSURE: f64 = 8.0;
+    /// Default pressure of the bed behind portal veins, the liver's sinusoids, in mmHg: the textbook has 3 to 5.
+    pub const DEFAULT_SINUSOID_PRESSURE: f64 = 4.0;
 
     /// Defaults for arteries.
     pub fn arterial() -> Self {
@@ -65,6 +69,13 @@ impl FlowSettings {
     pub fn venous() -> Self {
         let root = RootPressure::Constant(Pressure::from_mmhg(Self::DEFAULT_VENOUS_PRESSURE));
         Self { root, ..Self::arterial() }
+    }
+
+    /// Defaults for portal veins, which lead from the bed of the gut to that of the liver.
+    pub fn portal() -> Self {
+        let root = RootPressure::Constant(Pressure::from_mmhg(Self::DEFAULT_PORTAL_PRESSURE));
+        let pressure = Pressure::from_mmhg(Self::DEFAULT_SINUSOID_PRESSURE);
+        Self { root, bed: BedSettings { pressure, ..BedSettings::default() }, ..Self::arterial() }
     }
 
     /// Checks every number.

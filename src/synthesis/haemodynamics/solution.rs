@@ -1,7 +1,7 @@
 //! What a solved network tells: pressures and flows by node, and what follows from them.
 
 use super::{
-    Network, OpenEnd,
+    Network, NetworkEnd,
     network::{FIRST, REFERENCE, SOURCE},
 };
 use crate::synthesis::units::Flow;
@@ -89,7 +89,7 @@ impl Network {
 
     /// The open ends, in the order of their segments, as of the last [`settle`](Self::settle) or
     /// [`solve`](Self::solve).
-    pub fn open_ends(&self) -> &[OpenEnd] {
+    pub fn open_ends(&self) -> &[NetworkEnd] {
         self.ends.all()
     }
 }

@@ -25,25 +25,11 @@
 //! back, so the same tree gives the same bytes everywhere.
 
 mod atomic;
-mod csv;
-#[cfg(feature = "mesh_files")]
-mod glb;
-mod obj;
-#[cfg(feature = "mesh_files")]
-mod obj_mesh;
-#[cfg(feature = "mesh_files")]
-mod read_mesh;
-mod swc;
-mod swc_read;
+mod mesh;
+mod tree;
 
 pub use atomic::{WriteError, write_atomically};
-pub use csv::{save_csv, write_csv};
 #[cfg(feature = "mesh_files")]
-pub use glb::read_glb;
-pub use obj::{ObjOptions, save_obj, write_obj};
-#[cfg(feature = "mesh_files")]
-pub use obj_mesh::read_obj_mesh;
-#[cfg(feature = "mesh_files")]
-pub use read_mesh::{MeshReadError, read_mesh};
-pub use swc::{SwcOptions, save_swc, write_swc};
-pub use swc_read::{ReadError, SwcReadOptions, load_swc, read_swc};
+pub use mesh::{MeshReadError, load_mesh, read_glb, read_obj_mesh};
+pub use mesh::{ObjOptions, save_obj, write_obj};
+pub use tree::{ReadError, SwcOptions, SwcReadOptions, load_swc, read_swc, save_csv, save_swc, write_csv, write_swc};

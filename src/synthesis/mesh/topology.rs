@@ -1,6 +1,9 @@
 //! How the triangles of a mesh hang together once vertices at the same position count as one.
 
-use super::{TriangleMesh, doubled_normal, is_degenerate};
+use super::{
+    TriangleMesh,
+    triangle_mesh::{doubled_normal, is_degenerate},
+};
 use bevy_math::Vec3;
 use std::collections::VecDeque;
 

@@ -7,8 +7,11 @@
 //!
 //! UVs are the rays' longitude and latitude: good for mottling, not for baking (they meet at two poles and wrap once).
 
-use super::{OrganError, OrganMesh, RootSites, Viewpoint, linear, mix, noise::Noise};
-use crate::synthesis::rng::{Stream, VesselRng};
+use crate::synthesis::random::{Stream, VesselRng};
+use crate::synthesis::{
+    mesh::ShadedMesh,
+    organ::{OrganSettingsError, RootSites, Viewpoint, linear, mix, noise::Noise},
+};
 use bevy_math::{Quat, Vec2, Vec3, ops};
 use rand::{Rng, RngExt};
 use std::collections::BTreeMap;
@@ -49,7 +52,7 @@ impl LiverSettings {
     ///
     /// # Errors
     /// A setting outside its limits, by name.
-    pub fn generate(&self) -> Result<Liver, OrganError> {
+    pub fn generate(&self) -> Result<Liver, OrganSettingsError> {
         self.validate()?;
         Ok(build(self))
     }
@@ -58,9 +61,13 @@ impl LiverSettings {
     ///
     /// # Errors
     /// The first value outside its limits.
-    pub fn validate(&self) -> Result<(), OrganError> {
+    pub fn validate(&self) -> Result<(), OrganSettingsError> {
         let check = |name, value: f32, range: std::ops::RangeInclusive<f32>, limits| {
-            if range.contains(&value) { Ok(()) } else { Err(OrganError { organ: "liver", name, value, limits }) }
+            if range.contains(&value) {
+                Ok(())
+            } else {
+                Err(OrganSettingsError { organ: "liver", name, value, limits })
+            }
         };
         check("width", self.width, 0.01..=5.0, "0.01 to 5 m")?;
         check("variation", self.variation, 0.0..=1.5, "0 to 1.5")?;
@@ -85,7 +92,7 @@ impl Default for LiverSettings {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Liver {
     /// The closed surface.
-    pub mesh: OrganMesh,
+    pub mesh: ShadedMesh,
     /// Where vessels enter: the hepatic artery and portal vein at the porta hepatis (arterial), and the hepatic veins
     /// at the back, where they leave for the inferior vena cava (venous).
     pub roots: RootSites,
@@ -217,7 +224,7 @@ fn build(settings: &LiverSettings) -> Liver {
     let positions: Vec<Vec3> = directions.iter().map(|&direction| surface(direction)).collect();
     let (colors, uvs) =
         directions.iter().zip(&positions).map(|(&ray, &point)| (colour(point, colours), chart(ray))).unzip();
-    let mut mesh = OrganMesh {
+    let mut mesh = ShadedMesh {
         positions: positions.iter().map(|point| point * scale).collect(),
         normals: Vec::new(),
         uvs,

@@ -1,27 +1,27 @@
 //! What can be wrong with roots.
 
-use crate::synthesis::{mesh::MAX_COORDINATE, tree::System};
+use crate::synthesis::{mesh::MAX_COORDINATE, tree::VesselKind};
 use bevy_math::Vec3;
 
 /// Why roots cannot be put where they were asked for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RootError {
     /// A coordinate that is NaN, infinite or beyond [`MAX_COORDINATE`].
-    #[error("the {} root at {position} has a coordinate that is not finite and within ±{MAX_COORDINATE}", system.name())]
+    #[error("the {} root at {position} has a coordinate that is not finite and within ±{MAX_COORDINATE}", kind.name())]
     NotFinite {
         /// The system whose root it is.
-        system: System,
+        kind: VesselKind,
         /// The position asked for.
         position: Vec3,
     },
     /// A root out of reach of the tissue.
     #[error(
         "the {} root at {position} is {distance} from the tissue, further than its influence distance {reach}; move it closer or ask for the tissue's nearest point",
-        system.name()
+        kind.name()
     )]
     TooFar {
         /// The system whose root it is.
-        system: System,
+        kind: VesselKind,
         /// The position asked for.
         position: Vec3,
         /// Its distance from the tissue.
@@ -29,39 +29,45 @@ pub enum RootError {
         /// The system's influence distance.
         reach: f32,
     },
+    /// Roots or a given tree of a kind that the generator doesn't grow.
+    #[error("the generator grows no {} vessels; give them no roots and no tree, or choose another generator", kind.name())]
+    NotGrown {
+        /// The kind in question.
+        kind: VesselKind,
+    },
     /// Two roots at the same place.
-    #[error("two roots, {} and {}, coincide at {position}; move one of them", systems[0].name(), systems[1].name())]
+    #[error("two roots, {} and {}, coincide at {position}; move one of them", kinds[0].name(), kinds[1].name())]
     Coincide {
         /// The systems of the two roots.
-        systems: [System; 2],
+        kinds: [VesselKind; 2],
         /// Where they are.
         position: Vec3,
     },
     /// More roots to be spread than [`Roots::MAX_SPREAD`](super::Roots::MAX_SPREAD).
-    #[error("{count} {} roots are more than {limit}", system.name())]
+    #[error("{count} {} roots are more than {limit}", kind.name())]
     TooMany {
         /// The system in question.
-        system: System,
+        kind: VesselKind,
         /// The number asked for.
         count: u32,
         /// The largest number.
         limit: u32,
     },
     /// A tissue that gave fewer places than roots are to be spread.
-    #[error("the tissue has room for {found} of {wanted} {} roots; ask for fewer", system.name())]
+    #[error("the tissue has room for {found} of {wanted} {} roots; ask for fewer", kind.name())]
     NoRoom {
         /// The system in question.
-        system: System,
+        kind: VesselKind,
         /// The number asked for.
         wanted: u32,
         /// The number of places found.
         found: u32,
     },
     /// A way that roots are to reach below [`Roots::LEAST_REACH`](super::Roots::LEAST_REACH), or not a number.
-    #[error("{} roots are to reach {reach} equivalent diameters; it must be finite and at least {least}", system.name())]
+    #[error("{} roots are to reach {reach} equivalent diameters; it must be finite and at least {least}", kind.name())]
     Reach {
         /// The system in question.
-        system: System,
+        kind: VesselKind,
         /// The value found.
         reach: f32,
         /// The least value.
@@ -71,10 +77,10 @@ pub enum RootError {
     #[error("arterial and venous roots are both to be put beside the other's; place one of them otherwise")]
     BesideEachOther,
     /// A given tree with such a coordinate.
-    #[error("node {node} of the given {} tree is at {position}, which is not finite and within ±{MAX_COORDINATE}", system.name())]
+    #[error("node {node} of the given {} tree is at {position}, which is not finite and within ±{MAX_COORDINATE}", kind.name())]
     GivenNotFinite {
         /// The system whose tree it is.
-        system: System,
+        kind: VesselKind,
         /// The node.
         node: usize,
         /// Where it is.
@@ -83,11 +89,11 @@ pub enum RootError {
     /// A given tree out of reach of the tissue.
     #[error(
         "the given {} tree comes no closer to the tissue than {distance}, further than its influence distance {reach}; is it in the organ's local space?",
-        system.name()
+        kind.name()
     )]
     GivenTooFar {
         /// The system whose tree it is.
-        system: System,
+        kind: VesselKind,
         /// The smallest distance of a node from the tissue.
         distance: f32,
         /// The system's influence distance.

@@ -12,20 +12,21 @@ mod within;
 pub use error::RootError;
 
 use crate::synthesis::{
-    colonization::{ColonizationSettings, SystemSettings},
     mesh::is_usable,
-    rng::Stream,
+    random::Stream,
     tissue::{Tissue, TissuePoint},
-    tree::{System, VesselTree},
+    tree::{ByKind, VesselKind, VesselTree},
 };
 use bevy_math::Vec3;
+use std::ops::Index;
 
 /// Where the roots of one system are put.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum RootPlacement {
-    /// No root: this system does not grow, unless from a given tree.
+    /// No root: vessels of this kind don't grow, unless from a given tree.
+    #[default]
     None,
     /// This many roots, spread over the tissue, chosen by the seed. The first is where the tissue has an
     /// [entrance](Tissue::entrance), if it has one.
@@ -45,7 +46,6 @@ pub enum RootPlacement {
     Within(f32),
     /// One root beside each root of the other system, a step length away, in a direction chosen by the seed. Roots of the
     /// other system's given tree count too.
-    #[default]
     Beside,
     /// The tissue's nearest point to each of these.
     Nearest(Vec<Vec3>),
@@ -53,27 +53,78 @@ pub enum RootPlacement {
     Exact(Vec<Vec3>),
 }
 
-/// How both systems begin.
+/// Where the roots of each kind of vessels are put.
 ///
 /// The default is one artery, chosen by the seed, with a vein beside it; in a long organ several of them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Roots {
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub struct RootPlacements {
     /// Roots of the arteries.
-    pub arterial: RootPlacement,
+    ///
+    /// Default: one, chosen by the seed; in a long organ several.
+    pub artery: RootPlacement,
     /// Roots of the veins.
-    pub venous: RootPlacement,
-    /// Trees to go on growing from, besides the roots: arterial, venous. An empty tree is none.
-    pub given: [Option<VesselTree>; 2],
+    ///
+    /// Default: beside the arteries'.
+    pub vein: RootPlacement,
+    /// Roots of the portal veins.
+    ///
+    /// Default: none.
+    pub portal_vein: RootPlacement,
+    /// Roots of the ducts.
+    ///
+    /// Default: none.
+    pub duct: RootPlacement,
 }
 
-impl Default for Roots {
+impl Default for RootPlacements {
     fn default() -> Self {
         Self {
-            arterial: RootPlacement::Within(Self::DEFAULT_REACH),
-            venous: RootPlacement::Beside,
-            given: [None, None],
+            artery: RootPlacement::Within(Roots::DEFAULT_REACH),
+            vein: RootPlacement::Beside,
+            portal_vein: RootPlacement::None,
+            duct: RootPlacement::None,
         }
     }
+}
+
+impl Index<VesselKind> for RootPlacements {
+    type Output = RootPlacement;
+
+    fn index(&self, kind: VesselKind) -> &RootPlacement {
+        match kind {
+            VesselKind::Artery => &self.artery,
+            VesselKind::Vein => &self.vein,
+            VesselKind::PortalVein => &self.portal_vein,
+            VesselKind::Duct => &self.duct,
+        }
+    }
+}
+
+/// How all kinds of vessels begin.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Roots {
+    /// Where roots are put.
+    pub placed: RootPlacements,
+    /// Trees to go on growing from, besides the roots. An empty tree is none.
+    pub given: ByKind<Option<VesselTree>>,
+}
+
+impl From<RootPlacements> for Roots {
+    fn from(placed: RootPlacements) -> Self {
+        Self { placed, given: ByKind::default() }
+    }
+}
+
+/// The two lengths of a generator that its roots go by, in tissue lengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RootSpacing {
+    /// How far from a root another one beside it is put, and what tells two roots apart: the length of a segment.
+    pub step: f32,
+    /// How far from the tissue a root may lie that is given as it is.
+    pub reach: f32,
 }
 
 impl Roots {
@@ -96,64 +147,70 @@ impl Roots {
     pub fn resolve(
         &self,
         tissue: &dyn Tissue,
-        settings: &ColonizationSettings,
+        spacing: &ByKind<Option<RootSpacing>>,
         seed: u64,
-    ) -> Result<[Vec<TissuePoint>; 2], RootError> {
+    ) -> Result<ByKind<Vec<TissuePoint>>, RootError> {
         let diameter = tissue.extent().equivalent_diameter();
         let tissue = tissue.at_step(1);
-        for system in System::ALL {
-            self.check_given(tissue, system, settings.system(system))?;
+        for (kind, spacing) in spacing.iter() {
+            self.check_given(tissue, kind, spacing.as_ref())?;
         }
-        // Those that depend on the other system's roots come second.
-        let order = match (&self.arterial, &self.venous) {
-            (RootPlacement::Beside, RootPlacement::Beside) => return Err(RootError::BesideEachOther),
-            (RootPlacement::Beside, _) => [System::Venous, System::Arterial],
-            _ => System::ALL,
-        };
         let mut rng = Stream::Roots.rng(seed);
-        let mut roots = [Vec::new(), Vec::new()];
-        for system in order {
-            let own = settings.system(system);
-            roots[system.index()] = match self.placement(system) {
+        let mut roots = ByKind::<Vec<TissuePoint>>::default();
+        for kind in self.order()? {
+            let placement = &self.placed[kind];
+            let own = match spacing[kind] {
+                Some(own) => own,
+                None if *placement == RootPlacement::None => continue,
+                None => return Err(RootError::NotGrown { kind }),
+            };
+            roots[kind] = match placement {
                 RootPlacement::None => Vec::new(),
-                RootPlacement::Spread(count) => spread::spread(tissue, system, *count, &mut rng)?,
+                RootPlacement::Spread(count) => spread::spread(tissue, kind, *count, &mut rng)?,
                 RootPlacement::Within(reach) => {
-                    check_reach(system, *reach)?;
-                    within::within(tissue, system, reach * diameter, &mut rng)?
+                    check_reach(kind, *reach)?;
+                    within::within(tissue, kind, reach * diameter, &mut rng)?
                 }
                 RootPlacement::Beside => {
-                    let others = self.neighbours(tissue, system, &roots);
-                    others.iter().map(|root| spread::beside(tissue, root, own.step_length, &mut rng)).collect()
+                    let others = self.neighbours(tissue, kind.companion(), &roots);
+                    others.iter().map(|root| spread::beside(tissue, root, own.step, &mut rng)).collect()
                 }
-                RootPlacement::Nearest(points) => nearest(tissue, system, points)?,
-                RootPlacement::Exact(points) => exact(tissue, system, points, own.influence_distance)?,
+                RootPlacement::Nearest(points) => nearest(tissue, kind, points)?,
+                RootPlacement::Exact(points) => exact(tissue, kind, points, own.reach)?,
             };
         }
-        check_apart(&roots, settings)?;
+        check_apart(&roots, spacing)?;
         Ok(roots)
     }
 
-    /// How the roots of one system are put.
-    pub fn placement(&self, system: System) -> &RootPlacement {
-        match system {
-            System::Arterial => &self.arterial,
-            System::Venous => &self.venous,
+    /// The kinds in an order in which those whose roots others go by come first.
+    fn order(&self) -> Result<impl Iterator<Item = VesselKind>, RootError> {
+        let is_beside = |kind: VesselKind| self.placed[kind] == RootPlacement::Beside;
+        if is_beside(VesselKind::Artery) && is_beside(VesselKind::Artery.companion()) {
+            return Err(RootError::BesideEachOther);
         }
+        let mut order = VesselKind::ALL;
+        order.sort_by_key(|&kind| is_beside(kind));
+        Ok(order.into_iter())
     }
 
-    /// The other system's roots, those of its given tree included.
-    fn neighbours(&self, tissue: &dyn Tissue, system: System, roots: &[Vec<TissuePoint>; 2]) -> Vec<TissuePoint> {
-        let other = 1 - system.index();
-        let given = self.given[other].iter().flat_map(|tree| tree.roots().map(|root| tree.positions()[root]));
-        roots[other].iter().copied().chain(given.map(|position| tissue.closest_point(position))).collect()
+    /// The roots of a kind, those of its given tree included.
+    fn neighbours(&self, tissue: &dyn Tissue, kind: VesselKind, roots: &ByKind<Vec<TissuePoint>>) -> Vec<TissuePoint> {
+        let given = self.given[kind].iter().flat_map(|tree| tree.roots().map(|root| tree.positions()[root]));
+        roots[kind].iter().copied().chain(given.map(|position| tissue.closest_point(position))).collect()
     }
 
-    fn check_given(&self, tissue: &dyn Tissue, system: System, settings: &SystemSettings) -> Result<(), RootError> {
-        let Some(tree) = self.given[system.index()].as_ref().filter(|tree| !tree.is_empty()) else { return Ok(()) };
+    fn check_given(
+        &self,
+        tissue: &dyn Tissue,
+        kind: VesselKind,
+        spacing: Option<&RootSpacing>,
+    ) -> Result<(), RootError> {
+        let Some(tree) = self.given[kind].as_ref().filter(|tree| !tree.is_empty()) else { return Ok(()) };
+        let reach = spacing.ok_or(RootError::NotGrown { kind })?.reach;
         if let Some(node) = tree.positions().iter().position(|&position| !is_usable(position)) {
-            return Err(RootError::GivenNotFinite { system, node, position: tree.positions()[node] });
+            return Err(RootError::GivenNotFinite { kind, node, position: tree.positions()[node] });
         }
-        let reach = settings.influence_distance;
         let mut least = f32::INFINITY;
         for &position in tree.positions() {
             least = least.min(tissue.closest_point(position).position.distance(position));
@@ -161,53 +218,55 @@ impl Roots {
                 return Ok(());
             }
         }
-        Err(RootError::GivenTooFar { system, distance: least, reach })
+        Err(RootError::GivenTooFar { kind, distance: least, reach })
     }
 }
 
-fn nearest(tissue: &dyn Tissue, system: System, points: &[Vec3]) -> Result<Vec<TissuePoint>, RootError> {
-    check_finite(system, points)?;
+fn nearest(tissue: &dyn Tissue, kind: VesselKind, points: &[Vec3]) -> Result<Vec<TissuePoint>, RootError> {
+    check_finite(kind, points)?;
     Ok(points.iter().map(|&position| tissue.closest_point(position)).collect())
 }
 
-fn exact(tissue: &dyn Tissue, system: System, points: &[Vec3], reach: f32) -> Result<Vec<TissuePoint>, RootError> {
-    check_finite(system, points)?;
+fn exact(tissue: &dyn Tissue, kind: VesselKind, points: &[Vec3], reach: f32) -> Result<Vec<TissuePoint>, RootError> {
+    check_finite(kind, points)?;
     let place = |&position: &Vec3| {
         let closest = tissue.closest_point(position);
         let distance = closest.position.distance(position);
         if distance > reach {
-            return Err(RootError::TooFar { system, position, distance, reach });
+            return Err(RootError::TooFar { kind, position, distance, reach });
         }
         Ok(TissuePoint { position, normal: closest.normal })
     };
     points.iter().map(place).collect()
 }
 
-fn check_reach(system: System, reach: f32) -> Result<(), RootError> {
+fn check_reach(kind: VesselKind, reach: f32) -> Result<(), RootError> {
     let usable = reach.is_finite() && reach >= Roots::LEAST_REACH;
-    if usable { Ok(()) } else { Err(RootError::Reach { system, reach, least: Roots::LEAST_REACH }) }
+    if usable { Ok(()) } else { Err(RootError::Reach { kind, reach, least: Roots::LEAST_REACH }) }
 }
 
-fn check_finite(system: System, points: &[Vec3]) -> Result<(), RootError> {
+fn check_finite(kind: VesselKind, points: &[Vec3]) -> Result<(), RootError> {
     match points.iter().find(|point| !is_usable(**point)) {
-        Some(&position) => Err(RootError::NotFinite { system, position }),
+        Some(&position) => Err(RootError::NotFinite { kind, position }),
         None => Ok(()),
     }
 }
 
-/// Refuses roots at the same place, in one system or in both.
-fn check_apart(roots: &[Vec<TissuePoint>; 2], settings: &ColonizationSettings) -> Result<(), RootError> {
-    let step = settings.arterial.step_length.min(settings.venous.step_length);
-    let all = System::ALL.map(|system| roots[system.index()].iter().map(move |root| (system, root.position)));
-    let mut all: Vec<(System, Vec3)> = all.into_iter().flatten().collect();
+/// Refuses roots at the same place, of one kind or of two.
+fn check_apart(roots: &ByKind<Vec<TissuePoint>>, spacing: &ByKind<Option<RootSpacing>>) -> Result<(), RootError> {
+    let step = spacing.values().flatten().map(|spacing| spacing.step).fold(f32::INFINITY, f32::min);
+    let of_kind = |(kind, roots): (VesselKind, &Vec<TissuePoint>)| -> Vec<_> {
+        roots.iter().map(|root| (kind, root.position)).collect()
+    };
+    let mut all: Vec<(VesselKind, Vec3)> = roots.iter().flat_map(of_kind).collect();
     // Sorted along x, only neighbours within the distance need to be compared.
     all.sort_by(|a, b| a.1.x.total_cmp(&b.1.x));
     let limit = Roots::COINCIDENCE * step;
-    for (index, &(system, position)) in all.iter().enumerate() {
+    for (index, &(kind, position)) in all.iter().enumerate() {
         let near = all[index + 1..].iter().take_while(|(_, other)| other.x - position.x <= limit);
         for &(other, second) in near {
             if second.distance(position) <= limit {
-                return Err(RootError::Coincide { systems: [system, other], position });
+                return Err(RootError::Coincide { kinds: [kind, other], position });
             }
         }
     }

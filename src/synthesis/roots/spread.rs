@@ -2,9 +2,9 @@
 
 use super::{RootError, Roots};
 use crate::synthesis::{
-    rng::VesselRng,
+    random::VesselRng,
     tissue::{Tissue, TissuePoint},
-    tree::System,
+    tree::VesselKind,
 };
 use bevy_math::Vec3;
 use rand::RngExt;
@@ -22,12 +22,12 @@ const DIRECTIONS: u32 = 16;
 /// "Clustering to minimize the maximum intercluster distance", 1985).
 pub(super) fn spread(
     tissue: &dyn Tissue,
-    system: System,
+    kind: VesselKind,
     count: u32,
     rng: &mut VesselRng,
 ) -> Result<Vec<TissuePoint>, RootError> {
     if count > Roots::MAX_SPREAD {
-        return Err(RootError::TooMany { system, count, limit: Roots::MAX_SPREAD });
+        return Err(RootError::TooMany { kind, count, limit: Roots::MAX_SPREAD });
     }
     let samples = draw(tissue, SPREAD_SAMPLES.max(count * SAMPLES_PER_ROOT), rng);
     let mut distances = vec![f32::INFINITY; samples.len()];
@@ -36,7 +36,7 @@ pub(super) fn spread(
     let mut next = 0;
     while chosen.len() < count as usize {
         if distances.get(next).is_none_or(|&distance| distance == 0.0) {
-            return Err(RootError::NoRoom { system, wanted: count, found: chosen.len() as u32 });
+            return Err(RootError::NoRoom { kind, wanted: count, found: chosen.len() as u32 });
         }
         let root = TissuePoint { position: samples[next], ..tissue.closest_point(samples[next]) };
         chosen.push(root);

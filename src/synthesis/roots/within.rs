@@ -10,9 +10,9 @@ use super::{
     spread::{SPREAD_SAMPLES, draw},
 };
 use crate::synthesis::{
-    rng::VesselRng,
+    random::VesselRng,
     tissue::{Tissue, TissuePoint},
-    tree::System,
+    tree::VesselKind,
 };
 use bevy_math::Vec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -41,13 +41,13 @@ const SPARED: usize = 200;
 /// stays, and again and again the sample furthest from all roots becomes another, until they are near enough.
 pub(super) fn within(
     tissue: &dyn Tissue,
-    system: System,
+    kind: VesselKind,
     way: f32,
     rng: &mut VesselRng,
 ) -> Result<Vec<TissuePoint>, RootError> {
     let samples = draw(tissue, SPREAD_SAMPLES, rng);
     if samples.is_empty() {
-        return Err(RootError::NoRoom { system, wanted: 1, found: 0 });
+        return Err(RootError::NoRoom { kind, wanted: 1, found: 0 });
     }
     // Whoever says where vessels enter has said all.
     let place = |&position: &Vec3| TissuePoint { position, ..tissue.closest_point(position) };

@@ -1,11 +1,13 @@
 //! Density fields: where a tissue asks for more vessels and where for fewer, such as hypoxic regions.
 
-use super::{
-    Extent, Piece, Tissue, TissuePoint,
-    error::{TissueError, finite_point, positive},
-    triangle::TriangleIndex,
+use crate::synthesis::{mesh::TriangleMesh, random::VesselRng};
+use crate::synthesis::{
+    mesh::triangle_index::TriangleIndex,
+    tissue::{
+        Extent, Tissue, TissuePiece, TissuePoint,
+        error::{TissueError, finite_point, positive},
+    },
 };
-use crate::synthesis::{mesh::TriangleMesh, rng::VesselRng};
 use bevy_math::{UVec3, Vec3, bounding::Aabb3d};
 use rand::RngExt;
 use std::{fmt, sync::Arc};
@@ -165,7 +167,7 @@ impl Tissue for DensityTissue {
         (rng.random::<f32>() < self.field.at(point)).then_some(point)
     }
 
-    fn cut(&self, reach: f32, pieces: &mut Vec<Piece>) -> bool {
+    fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
         self.tissue.cut(reach, pieces)
     }
 

@@ -1,5 +1,4 @@
-use super::voxels::Grid;
-use crate::synthesis::mesh::{MAX_COORDINATE, MeshError};
+use crate::synthesis::mesh::{MAX_COORDINATE, MeshError, VoxelError};
 use bevy_math::Vec3;
 
 /// Why a tissue could not be made.
@@ -24,23 +23,9 @@ pub enum TissueError {
         /// The value found.
         value: f32,
     },
-    /// A voxel grid without voxels.
-    #[error("the resolution is 0; it must be at least 1 voxel along the longest side, 128 is usual")]
-    NoResolution,
-    /// More voxels than fit into memory.
-    #[error("a resolution of {resolution} takes {voxels} voxels, more than {}; lower it", Grid::MAX_VOXELS)]
-    TooManyVoxels {
-        /// Voxels along the longest side.
-        resolution: u32,
-        /// All voxels.
-        voxels: f64,
-    },
-    /// Large triangles in numbers that fill space instead of surrounding it.
-    #[error("the triangles touch the voxels in more than {limit} places; lower the resolution, or repair the mesh")]
-    TooManyTouches {
-        /// The largest number of places.
-        limit: usize,
-    },
+    /// The mesh has no voxels of the resolution.
+    #[error(transparent)]
+    Voxels(#[from] VoxelError),
     /// A mesh that has no inside, such as a sheet.
     #[error(
         "no part of the mesh's box is enclosed by it at a resolution of {resolution}; close its holes, or grow on the surface instead"

@@ -1,12 +1,14 @@
 //! Masks: the set pixels of an image, or the set voxels of a volume image, as a tissue.
 
-use super::{
-    Extent, Tissue, TissuePoint,
-    bvh::{Bounds, BoxTree},
-    error::{TissueError, finite_point, positive},
-    voxels::BitGrid,
+use crate::synthesis::random::VesselRng;
+use crate::synthesis::{
+    mesh::voxels::BitGrid,
+    space::bvh::{Bounds, BoxTree},
+    tissue::{
+        Extent, Tissue, TissuePoint,
+        error::{TissueError, finite_point, positive},
+    },
 };
-use crate::synthesis::rng::VesselRng;
 use bevy_math::{UVec2, UVec3, Vec2, Vec3, Vec3A, bounding::Aabb3d};
 use rand::RngExt;
 

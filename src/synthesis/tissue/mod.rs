@@ -14,38 +14,33 @@
 //! | [`density`] | any of these, with regions that ask for more or fewer vessels |
 //! | [`staged`] | one after the other |
 //!
-//! [`settings`] describes the tissue of an organ as data, and builds it from the organ's mesh.
+//! [`source`] describes the tissue of an organ as data, and builds it from the organ's mesh.
 
-pub mod bvh;
 pub mod density;
 mod error;
 pub mod growth;
 pub mod mask;
-mod orientation;
 pub mod path;
 mod pieces;
-pub mod settings;
 pub mod shape;
+pub mod source;
 pub mod staged;
 pub mod surface;
-pub mod triangle;
 pub mod volume;
-mod voxels;
 
 pub use density::{DensityField, DensityTissue};
 pub use error::TissueError;
 pub use growth::TissueGrowth;
 pub use mask::Mask;
 pub use path::GuidePath;
-pub use pieces::Piece;
-pub use settings::{Guide, TissueMode, TissueSettings};
+pub use pieces::TissuePiece;
 pub use shape::{Ball, Cuboid, Disc, Ellipsoid, Rectangle};
+pub use source::{Guide, TissueMode, TissueSettings};
 pub use staged::Staged;
 pub use surface::MeshSurface;
-pub use triangle::{SurfacePoint, TriangleIndex};
 pub use volume::MeshVolume;
 
-use crate::synthesis::rng::VesselRng;
+use crate::synthesis::random::VesselRng;
 use bevy_math::{Vec3, bounding::Aabb3d};
 use std::fmt::Debug;
 
@@ -117,7 +112,7 @@ pub trait Tissue: Debug + Send + Sync {
     ///
     /// A growth that knows which pieces are supplied draws its candidates from the others. Pieces of equal measure are drawn
     /// from faster.
-    fn cut(&self, _reach: f32, _pieces: &mut Vec<Piece>) -> bool {
+    fn cut(&self, _reach: f32, _pieces: &mut Vec<TissuePiece>) -> bool {
         false
     }
 

@@ -1,13 +1,15 @@
 //! Guides: polylines along which large vessels are led before the tissue around them is filled (Rauch & Harders 2021,
 //! Fig. 4).
 
-use super::{
-    Extent, Tissue, TissuePoint,
-    bvh::{Bounds, BoxTree},
-    error::{TissueError, finite, finite_point},
-    shape::in_unit_ball,
+use crate::synthesis::random::VesselRng;
+use crate::synthesis::{
+    space::bvh::{Bounds, BoxTree},
+    tissue::{
+        Extent, Tissue, TissuePoint,
+        error::{TissueError, finite, finite_point},
+        shape::in_unit_ball,
+    },
 };
-use crate::synthesis::rng::VesselRng;
 use bevy_math::{
     Vec3,
     bounding::{Aabb3d, BoundingVolume},

@@ -4,7 +4,7 @@ use bevy_math::Vec3;
 
 /// A part of a tissue: a sector of a ring, a rectangle, a triangle. The pieces of a tissue cover all of it and do not overlap.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece {
+pub struct TissuePiece {
     /// Centre of a ball that holds the piece.
     pub center: Vec3,
     /// Radius of that ball.

@@ -1,7 +1,7 @@
 //! Staged tissues: first along guides, then over the surface, then through the volume (Rauch & Harders 2021, Fig. 3 and 4).
 
 use super::{Extent, Tissue, TissuePoint, error::TissueError};
-use crate::synthesis::rng::VesselRng;
+use crate::synthesis::random::VesselRng;
 use bevy_math::{
     Vec3,
     bounding::{Aabb3d, BoundingVolume},

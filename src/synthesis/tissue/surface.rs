@@ -1,12 +1,13 @@
 //! The surface of an organ's mesh as a tissue.
 
-use super::{
-    Extent, Piece, Tissue, TissuePoint,
-    error::TissueError,
-    pieces,
-    triangle::{SurfacePoint, TriangleIndex},
+use crate::synthesis::{
+    mesh::TriangleMesh,
+    random::{VesselRng, alias_table::AliasTable, many},
 };
-use crate::synthesis::{alias::AliasTable, draws, mesh::TriangleMesh, rng::VesselRng};
+use crate::synthesis::{
+    mesh::triangle_index::{SurfacePoint, TriangleIndex},
+    tissue::{Extent, Tissue, TissuePiece, TissuePoint, error::TissueError, pieces},
+};
 use bevy_math::{Vec3, bounding::Aabb3d};
 use rand::RngExt;
 
@@ -139,14 +140,14 @@ impl Tissue for MeshSurface {
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
         let slots = self.picks.len() as u32;
         if slots > 0 {
-            draws::draw(rng, count, candidates, |[slot, keep, v, w]| {
-                Some(self.pick(draws::below(slot, slots), draws::unit(keep), [draws::unit(v), draws::unit(w)]))
+            many::draw(rng, count, candidates, |[slot, keep, v, w]| {
+                Some(self.pick(many::below(slot, slots), many::unit(keep), [many::unit(v), many::unit(w)]))
             });
         }
     }
 
     /// Triangles whose sides are longer than `reach` allows are cut into k² equal ones, by lines along their sides.
-    fn cut(&self, reach: f32, pieces: &mut Vec<Piece>) -> bool {
+    fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
         for triangle in (0..self.mesh.triangles().len()).filter(|&triangle| !self.mesh.is_degenerate(triangle)) {
             let [a, b, c] = self.mesh.corners(triangle);
             let parts = self.parts(triangle, reach);
@@ -155,7 +156,7 @@ impl Tissue for MeshSurface {
                 let corners = small_triangle(part, parts).map(|[v, w]| a + (b - a) * v + (c - a) * w);
                 let center = (corners[0] + corners[1] + corners[2]) / 3.0;
                 let reach = corners.iter().map(|corner| corner.distance(center)).fold(0.0, f32::max);
-                pieces.push(Piece { center, reach, measure, id: [triangle as u32, part] });
+                pieces.push(TissuePiece { center, reach, measure, id: [triangle as u32, part] });
             }
         }
         true

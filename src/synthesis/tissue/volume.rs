@@ -7,15 +7,16 @@
 //! Inside is what the mesh winds around. That forgives duplicated vertices, small holes, overlapping and nested shells and
 //! triangles that face the wrong way.
 
-use super::{
-    Extent, Tissue, TissuePoint,
-    bvh::Bounds,
-    error::TissueError,
-    orientation::oriented,
-    triangle::TriangleIndex,
-    voxels::{BitGrid, Finding, Grid, MAJORITY, crossing},
+use crate::synthesis::{mesh::TriangleMesh, random::VesselRng};
+use crate::synthesis::{
+    mesh::{
+        triangle_index::TriangleIndex,
+        voxels::{BitGrid, Finding, Grid, MAJORITY, crossing},
+        winding::oriented,
+    },
+    space::bvh::Bounds,
+    tissue::{Extent, Tissue, TissuePoint, error::TissueError},
 };
-use crate::synthesis::{mesh::TriangleMesh, rng::VesselRng};
 use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
 use rand::RngExt;
 
@@ -75,12 +76,9 @@ impl MeshVolume {
     /// resolution. Holes in the mesh are closed best when they are smaller than the organ is thick.
     ///
     /// # Errors
-    /// [`TissueError::NoResolution`], [`TissueError::TooManyVoxels`] or [`TissueError::TooManyTouches`] for a resolution
+    /// [`TissueError::Voxels`] for a resolution
     /// that cannot be used with this mesh; [`TissueError::NoInside`] for a mesh that encloses nothing.
     pub fn new(mesh: &TriangleMesh, resolution: u32) -> Result<Self, TissueError> {
-        if resolution == 0 {
-            return Err(TissueError::NoResolution);
-        }
         let grid = Grid::over(&mesh.bounds(), resolution)?;
         let mesh = mesh.welded();
         let index = TriangleIndex::new(&mesh);

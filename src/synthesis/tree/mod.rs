@@ -5,13 +5,18 @@
 
 use bevy_math::Vec3;
 
+mod bed_links;
 mod hash;
+mod kind;
+pub mod murray;
 mod place;
 pub mod statistics;
 pub mod sweep;
 pub mod validate;
 
+pub use bed_links::BedLink;
 pub use hash::hash_trees;
+pub use kind::{ByKind, VesselKind};
 pub use place::Place;
 pub use statistics::TreeStatistics;
 pub use validate::TreeError;
@@ -31,35 +36,6 @@ impl NodeId {
 /// What [`VesselTree::parents`] holds for a root.
 pub const NO_PARENT: u32 = u32::MAX;
 
-/// The two halves of the circulation that grow together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
-pub enum System {
-    /// Brings oxygen: grows towards oxygen drains.
-    Arterial,
-    /// Takes carbon dioxide away: grows towards the drains that an artery has supplied.
-    Venous,
-}
-
-impl System {
-    /// Both systems, in the order in which a step grows them.
-    pub const ALL: [Self; 2] = [Self::Arterial, Self::Venous];
-
-    /// 0 for arterial, 1 for venous.
-    pub fn index(self) -> usize {
-        self as usize
-    }
-
-    /// Lower-case name, as used in file names and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Arterial => "arterial",
-            Self::Venous => "venous",
-        }
-    }
-}
-
 /// A tree, or forest, of vessel segments.
 ///
 /// Positions and radii are in tissue lengths. A parent always stands before its children: `parents[i] < i`, so a
@@ -73,8 +49,8 @@ pub struct VesselTree {
 
 impl VesselTree {
     /// A tree without nodes.
-    pub fn new() -> Self {
-        Self::default()
+    pub const fn new() -> Self {
+        Self { positions: Vec::new(), parents: Vec::new(), radii: Vec::new() }
     }
 
     /// A tree of given arrays, checked by [`validate`](Self::validate).

@@ -8,7 +8,7 @@
 //! they were given in and are asked there, so a ball stays a ball of the world under non-uniform scale, mirrors and
 //! shears.
 
-use super::region::{Region, axes};
+use crate::synthesis::segment_index::{Region, axes};
 use bevy_math::{Affine3A, DAffine3, DMat3, DVec3, Vec3};
 
 /// Why a blade cannot cut.

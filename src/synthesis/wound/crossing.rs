@@ -21,9 +21,9 @@
 //! rounding. For curved shapes it is a sign in f64 that depends on the node alone, or, between two nodes on the same
 //! side, on a root in f64. Both ways neighbours agree about the node that they share.
 
-use super::Region;
 use super::blade::{Blade, Disc, Part, Volume};
-use super::orientation::orientation;
+use crate::synthesis::segment_index::Region;
+use crate::synthesis::space::exact_side::orientation;
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{DVec3, Vec3};
 

@@ -1,6 +1,6 @@
-//! Cuts, clamps, ties and seals on a vessel tree; how it bleeds and stops, and what tissue it leaves without blood.
+//! Cuts, clamps, ties and seals on a vessel tree.
 //!
-//! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and a [`SegmentIndex`]. Out: a
+//! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and a [`SegmentIndex`](super::segment_index::SegmentIndex). Out: a
 //! [`WoundReport`] for each action, with every end that it opened or closed; and at any time [`Wounds`], from which the
 //! flow learns how far blood comes ([`Wounds::interruptions`]) and a renderer what is left to draw ([`write_stumps`]).
 //!
@@ -23,7 +23,7 @@
 //! ```
 //! use bevy_math::Vec3;
 //! use bevy_vessels::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
-//! use bevy_vessels::synthesis::wound::{Blade, EndSide, Region, Retraction, Wounds};
+//! use bevy_vessels::synthesis::{segment_index::Region, wound::{Blade, EndSide, Retraction, Wounds}};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let tree = VesselTree::from_arrays(vec![Vec3::ZERO, 4.0 * Vec3::X], vec![NO_PARENT, 0], vec![0.1; 2])?;
@@ -43,37 +43,20 @@
 //! ```
 
 mod blade;
-pub mod bleeding;
-pub mod blood_volume;
-pub mod clotting;
 mod crossing;
 mod error;
 mod injury;
-pub mod ischaemia;
-mod orientation;
-mod region;
+mod ledger;
 mod report;
 mod retraction;
-mod round_cone;
-mod search;
-mod segment_index;
-mod segment_run;
 mod stumps;
 mod withdrawal;
-mod wounds;
 
 pub use crate::synthesis::haemodynamics::EndSide;
 pub use blade::{Blade, BladeError};
-pub use bleeding::{Bleeding, BleedingChange, BleedingEnd, BleedingSettings, EndState};
-pub use blood_volume::{BloodVolume, BloodVolumeSettings};
-pub use clotting::Clotting;
 pub use crossing::{Severed, severed};
 pub use error::WoundError;
-pub use ischaemia::{Supply, TissueSupply};
-pub use region::Region;
+pub use ledger::Wounds;
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
 pub use retraction::Retraction;
-pub use search::SegmentSearch;
-pub use segment_index::SegmentIndex;
-pub use stumps::{Blockage, Piece, PieceKind, write_stumps, write_stumps_of};
-pub use wounds::Wounds;
+pub use stumps::{Blockage, PieceKind, SegmentPiece, write_stumps, write_stumps_of};

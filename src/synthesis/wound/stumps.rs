@@ -6,10 +6,13 @@
 
 use super::crossing::segment;
 use super::injury::{Gap, Injury, Tip};
-use super::{EndId, Region, Wounds};
 use crate::synthesis::haemodynamics::{Interruption, Outlet};
 use crate::synthesis::instances::{SegmentColors, SegmentInstance, segment_instance};
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
+use crate::synthesis::{
+    segment_index::Region,
+    wound::{EndId, Wounds},
+};
 use bevy_math::Vec3;
 use std::ops::Range;
 
@@ -26,7 +29,7 @@ pub enum PieceKind {
 
 /// A piece that is left of a severed segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Piece {
+pub struct SegmentPiece {
     /// The node in which the segment ends.
     pub node: NodeId,
     /// Which piece.
@@ -102,7 +105,7 @@ impl Wounds {
     }
 
     /// What is left of a severed segment, from parent to node; nothing of one that is whole, or wholly taken out.
-    pub fn pieces(&self, node: NodeId) -> impl Iterator<Item = Piece> + '_ {
+    pub fn pieces(&self, node: NodeId) -> impl Iterator<Item = SegmentPiece> + '_ {
         self.injury(node).into_iter().flat_map(move |injury| {
             let gaps = injury.gaps().len();
             let kind = move |index: usize| match index {
@@ -111,7 +114,7 @@ impl Wounds {
                 _ => PieceKind::Floating,
             };
             let pieces = injury.pieces().enumerate().filter(move |_| gaps > 0);
-            let pieces = pieces.map(move |(index, [from, to])| Piece { node, kind: kind(index), from, to });
+            let pieces = pieces.map(move |(index, [from, to])| SegmentPiece { node, kind: kind(index), from, to });
             pieces.filter(|piece| piece.from < piece.to)
         })
     }

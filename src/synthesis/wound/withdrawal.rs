@@ -11,10 +11,10 @@
 use super::crossing::{Severed, segment};
 use super::injury::{Gap, Injury, NO_INJURY, Removal, Tip};
 use super::stumps::{END_DOME, LUMEN_DEPTH, START_DOME};
-use super::{Retraction, SegmentSearch};
 use crate::synthesis::haemodynamics::EndSide;
 use crate::synthesis::instances::MAX_FLARE;
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
+use crate::synthesis::{segment_index::SegmentSearch, wound::Retraction};
 use std::collections::BTreeMap;
 
 /// How wide another branch may be, as a share of a vessel, that this vessel is drawn flat where both leave it. A wider one

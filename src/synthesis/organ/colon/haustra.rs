@@ -1,6 +1,6 @@
 //! Haustra: where the wall is drawn in between the taeniae, row by row.
 
-use crate::synthesis::{organ::centre_line::CentreLine, rng::VesselRng};
+use crate::synthesis::{organ::centre_line::CentreLine, random::VesselRng};
 use bevy_math::ops;
 use rand::RngExt;
 

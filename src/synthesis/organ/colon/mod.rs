@@ -15,15 +15,18 @@
 //! let colon = ColonSettings { seed: 7, triangles: 20_000, ..Default::default() }.generate()?;
 //! assert!(colon.haustra > 30);
 //! assert!(colon.mesh.signed_volume() > 0.0);
-//! # Ok::<(), bevy_vessels::synthesis::organ::OrganError>(())
+//! # Ok::<(), bevy_vessels::synthesis::organ::OrganSettingsError>(())
 //! ```
 
 mod haustra;
 mod path;
 mod wall;
 
-use super::{OrganError, OrganMesh, RootSites, Viewpoint};
-use crate::synthesis::rng::Stream;
+use crate::synthesis::random::Stream;
+use crate::synthesis::{
+    mesh::ShadedMesh,
+    organ::{OrganSettingsError, RootSites, Viewpoint},
+};
 use bevy_math::{Vec2, Vec3, ops};
 use std::{f32::consts::TAU, ops::Range};
 use wall::{Side, Wall};
@@ -104,7 +107,7 @@ impl ColonSettings {
     ///
     /// # Errors
     /// A setting outside its limits, by name.
-    pub fn generate(&self) -> Result<Colon, OrganError> {
+    pub fn generate(&self) -> Result<Colon, OrganSettingsError> {
         self.validate()?;
         Ok(build(self))
     }
@@ -113,9 +116,13 @@ impl ColonSettings {
     ///
     /// # Errors
     /// The first value outside its limits.
-    pub fn validate(&self) -> Result<(), OrganError> {
+    pub fn validate(&self) -> Result<(), OrganSettingsError> {
         let check = |name, value: f32, range: std::ops::RangeInclusive<f32>, limits| {
-            if range.contains(&value) { Ok(()) } else { Err(OrganError { organ: "colon", name, value, limits }) }
+            if range.contains(&value) {
+                Ok(())
+            } else {
+                Err(OrganSettingsError { organ: "colon", name, value, limits })
+            }
         };
         let calibre = self.calibre;
         check("width", self.width, 0.05..=5.0, "0.05 to 5 m")?;
@@ -154,7 +161,7 @@ impl Default for ColonSettings {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Colon {
     /// The closed surface: outer side, rim, inner side, in this order.
-    pub mesh: OrganMesh,
+    pub mesh: ShadedMesh,
     /// The triangles of the outer side, from the blind end to the rim.
     pub outer: Range<usize>,
     /// The triangles of the inner side, from the rim to the blind end of the lumen.
@@ -262,10 +269,10 @@ fn profile(wall: &Wall, side: Side) -> Profile {
 }
 
 /// Sweeps the wall along the rings.
-fn sweep(wall: &Wall, rings: &[Ring], columns: usize) -> OrganMesh {
+fn sweep(wall: &Wall, rings: &[Ring], columns: usize) -> ShadedMesh {
     let angles: Vec<f32> = (0..=columns).map(|column| column_angle(column, columns)).collect();
     let row = columns + 1;
-    let mut mesh = OrganMesh::default();
+    let mut mesh = ShadedMesh::default();
     let mut shared: Vec<u32> = Vec::with_capacity(rings.len() * row);
     let mut walked = Vec::with_capacity(rings.len());
     let mut last: Option<Vec3> = None;
@@ -346,7 +353,7 @@ fn ring_vertices(wall: &Wall, ring: &Ring, angles: &[f32], pole: bool) -> Vec<(V
 }
 
 /// Adds to a mesh what a scene needs beside it.
-fn describe(wall: &Wall, mesh: OrganMesh, outer: Range<usize>, inner: Range<usize>) -> Colon {
+fn describe(wall: &Wall, mesh: ShadedMesh, outer: Range<usize>, inner: Range<usize>) -> Colon {
     let (low, high) = mesh.bounds();
     let centre = 0.5 * (low + high);
     let height = high.y - low.y;

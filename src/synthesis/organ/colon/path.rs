@@ -3,7 +3,7 @@
 use super::ColonSettings;
 use crate::synthesis::{
     organ::centre_line::{CentreLine, Control},
-    rng::VesselRng,
+    random::VesselRng,
 };
 use bevy_math::{Vec3, ops};
 use rand::RngExt;

@@ -15,7 +15,7 @@ use crate::synthesis::{
         noise::Noise,
         smooth_step,
     },
-    rng::VesselRng,
+    random::VesselRng,
 };
 use bevy_math::{Vec3, ops};
 use std::f32::consts::{PI, TAU};
@@ -223,7 +223,7 @@ fn smooth_max(a: f32, b: f32, blend: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synthesis::rng::Stream;
+    use crate::synthesis::random::Stream;
 
     #[test]
     fn the_wall_has_a_thickness_everywhere_and_stays_within_its_clearance() {

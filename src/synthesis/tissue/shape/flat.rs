@@ -1,12 +1,12 @@
 //! Flat shapes, which are surfaces: disc and rectangle.
 
 use super::{in_unit_disc, signed, tolerance};
+use crate::synthesis::random::{VesselRng, many};
 use crate::synthesis::tissue::{
-    Extent, Piece, Tissue, TissuePoint,
+    Extent, Tissue, TissuePiece, TissuePoint,
     error::{TissueError, finite_point, positive},
     pieces,
 };
-use crate::synthesis::{draws, rng::VesselRng};
 use bevy_math::{UVec2, Vec2, Vec3, bounding::Aabb3d, ops};
 use std::f32::consts::{FRAC_1_SQRT_2, PI};
 
@@ -96,14 +96,14 @@ impl Tissue for Disc {
     }
 
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
-        draws::draw(rng, count, candidates, |words| {
-            let point = Vec2::from(words.map(draws::signed));
+        many::draw(rng, count, candidates, |words| {
+            let point = Vec2::from(words.map(many::signed));
             (point.length_squared() <= 1.0).then(|| self.at(point * self.radius))
         });
     }
 
     /// Rings of equal width, from the middle outwards, of 3, 9, 15, … sectors: all of the same area.
-    fn cut(&self, reach: f32, pieces: &mut Vec<Piece>) -> bool {
+    fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
         let rings = pieces::parts(self.radius, 1.15 * reach);
         let width = self.radius / rings as f32;
         let measure = PI * width * width / SECTORS as f32;
@@ -118,7 +118,7 @@ impl Tissue for Disc {
             let reach = corner.max(inner_corner).max(outer - middle).max(middle - inner);
             for sector in 0..sectors {
                 let center = self.at(middle * direction(half * (2 * sector + 1) as f32));
-                pieces.push(Piece { center, reach, measure, id: [ring, sector] });
+                pieces.push(TissuePiece { center, reach, measure, id: [ring, sector] });
             }
         }
         true
@@ -227,13 +227,13 @@ impl Tissue for Rectangle {
         Some(self.at(self.half * Vec2::new(signed(rng), signed(rng))))
     }
 
-    fn cut(&self, reach: f32, pieces: &mut Vec<Piece>) -> bool {
+    fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
         let counts = self.parts(reach);
         let part = 2.0 * self.half / counts.as_vec2();
         for y in 0..counts.y {
             for x in 0..counts.x {
                 let center = self.at((UVec2::new(x, y).as_vec2() + 0.5) * part - self.half);
-                pieces.push(Piece { center, reach: 0.5 * part.length(), measure: part.x * part.y, id: [x, y] });
+                pieces.push(TissuePiece { center, reach: 0.5 * part.length(), measure: part.x * part.y, id: [x, y] });
             }
         }
         true

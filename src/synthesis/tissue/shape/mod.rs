@@ -7,7 +7,7 @@ mod solid;
 pub use flat::{Disc, Rectangle};
 pub use solid::{Ball, Cuboid, Ellipsoid};
 
-use crate::synthesis::rng::VesselRng;
+use crate::synthesis::random::VesselRng;
 use bevy_math::{Vec2, Vec3};
 use rand::RngExt;
 

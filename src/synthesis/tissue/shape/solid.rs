@@ -1,11 +1,11 @@
 //! Solid shapes: ball, box and ellipsoid.
 
 use super::{in_unit_ball, signed, tolerance};
+use crate::synthesis::random::{VesselRng, many};
 use crate::synthesis::tissue::{
     Extent, Tissue, TissuePoint,
     error::{TissueError, finite_point, positive},
 };
-use crate::synthesis::{draws, rng::VesselRng};
 use bevy_math::{DVec3, Vec3, bounding::Aabb3d};
 use std::f32::consts::PI;
 
@@ -16,8 +16,8 @@ fn inside(position: Vec3) -> TissuePoint {
 
 /// Appends points drawn evenly from the unit ball, each where `place` puts it.
 fn draw_in_ball(rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>, place: impl Fn(Vec3) -> Vec3) {
-    draws::draw(rng, count, candidates, |words| {
-        let point = Vec3::from(words.map(draws::signed));
+    many::draw(rng, count, candidates, |words| {
+        let point = Vec3::from(words.map(many::signed));
         (point.length_squared() <= 1.0).then(|| place(point))
     });
 }
@@ -120,9 +120,7 @@ impl Tissue for Cuboid {
     }
 
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
-        draws::draw(rng, count, candidates, |words| {
-            Some(self.center + self.half * Vec3::from(words.map(draws::signed)))
-        });
+        many::draw(rng, count, candidates, |words| Some(self.center + self.half * Vec3::from(words.map(many::signed))));
     }
 }
 

@@ -1,0 +1,319 @@
+//! Circulate: the blood of organs with a [`Perfusion`], made to flow.
+//!
+//! In: [`Vessels`] at rest and the organ's settings. Out: the flow in [`CirculationState`]. Networks of small trees are
+//! made within a frame, those of large ones in the task pool. Given the same vessels, actions and time steps, the same is
+//! lost to the last bit, as long as no network is on its way.
+
+use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
+use crate::plugin::{
+    circulation::{
+        bleeding::BleedingMessages,
+        messages::{BleedingStopped, CirculationFailed},
+        organ_flow::{FlowingEnd, OrganFlow, Trees},
+        patient::Patient,
+        perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply},
+        supply::Gauge,
+    },
+    growth::{progress::GrowthProgress, state::GrowthState},
+    surgery::open_ends::{OpenEnd, OpenEndEntities},
+    vessels::{
+        relations::OrganVessels,
+        tree::{Lineage, Vessels},
+        wounds::VesselWounds,
+    },
+};
+use crate::synthesis::{
+    haemodynamics::{Bleeding, EndState, FlowError},
+    tree::{BedLink, ByKind, VesselKind},
+};
+use bevy::{
+    ecs::{
+        change_detection::{DetectChanges, DetectChangesMut},
+        component::Component,
+        entity::Entity,
+        hierarchy::ChildOf,
+        lifecycle::Remove,
+        message::MessageWriter,
+        observer::On,
+        query::{QueryData, With},
+        system::{Commands, Query},
+        world::{EntityWorldMut, Ref},
+    },
+    log::warn,
+    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
+};
+
+/// Nodes whose networks are made within a frame; those of more are made beside the frames.
+pub(crate) const AT_ONCE: usize = 8192;
+
+/// The flow in an organ's vessels. The plugin drives it.
+#[derive(Component, Debug, Default)]
+pub struct CirculationState {
+    /// The vessels that the flow is of, or will be when it is made.
+    made_for: Option<MadeFor>,
+    /// How they are perfused, paused or not.
+    made_with: Option<Perfusion>,
+    task: Option<Task<Result<OrganFlow, FlowError>>>,
+    pub(crate) flow: Option<OrganFlow>,
+    pub(crate) bleeding: ByKind<Bleeding>,
+    /// Open ends in the order of the networks'.
+    pub(crate) ends: ByKind<Vec<FlowingEnd>>,
+    /// Whether the gaps have to be laid anew.
+    pub(crate) is_unlaid: bool,
+    /// How the supply is measured, once the vessels have grown.
+    pub(crate) gauge: Gauge,
+    error: Option<FlowError>,
+}
+
+/// Which vessels a flow is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct MadeFor {
+    lineages: ByKind<Lineage>,
+    nodes: ByKind<usize>,
+    is_grown: bool,
+}
+
+impl CirculationState {
+    /// Whether blood flows: the vessels are there, and their network has been made.
+    pub fn flows(&self) -> bool {
+        self.flow.is_some()
+    }
+
+    /// How each open end of a kind of vessels bleeds, as of the last frame.
+    pub fn bleeding(&self, kind: VesselKind) -> &Bleeding {
+        &self.bleeding[kind]
+    }
+
+    /// Why no blood flows, if something is wrong.
+    pub fn error(&self) -> Option<&FlowError> {
+        self.error.as_ref()
+    }
+
+    pub(crate) fn flow(&self) -> Option<&OrganFlow> {
+        self.flow.as_ref()
+    }
+
+    /// Takes over a new flow, with what the old one has laid.
+    fn take(&mut self, mut flow: OrganFlow, is_grown: bool) -> Result<(), FlowError> {
+        if let Some(before) = &self.flow {
+            flow.keep_gaps_of(before)?;
+        }
+        self.flow = Some(flow);
+        self.is_unlaid = true;
+        self.gauge = if is_grown { Gauge::ready() } else { Gauge::default() };
+        Ok(())
+    }
+}
+
+/// A vessel entity, with all that flow reads.
+#[derive(QueryData)]
+pub(crate) struct Perfused {
+    pub(crate) entity: Entity,
+    pub(crate) vessels: &'static Vessels,
+    pub(crate) wounds: Option<Ref<'static, VesselWounds>>,
+    pub(crate) entities: Option<&'static OpenEndEntities>,
+}
+
+/// An organ with blood, and what its vessels grow from.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct PerfusedOrgan {
+    pub(crate) entity: Entity,
+    pub(crate) perfusion: Ref<'static, Perfusion>,
+    pub(crate) vessels: Option<&'static OrganVessels>,
+    pub(crate) growth: Option<&'static GrowthState>,
+    pub(crate) progress: Option<&'static GrowthProgress>,
+    pub(crate) state: &'static mut CirculationState,
+    pub(crate) loss: &'static mut BloodLoss,
+}
+
+/// Gives a patient to organs that find none, and their vessels what is to be written on them.
+pub(crate) fn prepare_organs(
+    mut commands: Commands,
+    organs: Query<(Entity, Option<&OrganVessels>), With<Perfusion>>,
+    patients: Query<(), With<Patient>>,
+    parents: Query<&ChildOf>,
+    supplies: Query<(), With<SegmentSupply>>,
+) {
+    for (organ, vessels) in &organs {
+        if patient_of(organ, &parents, |entity| patients.contains(entity)).is_none() {
+            commands.entity(organ).insert(Patient::default());
+        }
+        let entities = vessels.map_or(&[][..], OrganVessels::entities);
+        for &vessels in entities.iter().filter(|&&vessels| !supplies.contains(vessels)) {
+            commands.entity(vessels).try_insert(SegmentSupply::default());
+        }
+    }
+}
+
+/// Makes the flow of vessels that are new, have grown, or are to be perfused otherwise.
+pub(crate) fn make_flow(mut organs: Query<PerfusedOrgan>, vessels: Query<Perfused>, mut messages: BleedingMessages) {
+    for mut organ in &mut organs {
+        let made_for = organ.vessels_now(&vessels);
+        if organ.takes_note_of(made_for) {
+            organ.begin(made_for, &vessels, &mut messages);
+        }
+        let Some(made) = organ.state.task.as_mut().and_then(check_ready) else { continue };
+        organ.state.task = None;
+        organ.accept(made, &mut messages.failed);
+    }
+}
+
+impl PerfusedOrganItem<'_, '_> {
+    fn entities(&self) -> &[Entity] {
+        self.vessels.map_or(&[], OrganVessels::entities)
+    }
+
+    fn vessels_now(&self, vessels: &Query<Perfused>) -> MadeFor {
+        let is_grown = self.progress.is_none_or(GrowthProgress::is_finished);
+        let mut made_for = MadeFor { lineages: ByKind::default(), nodes: ByKind::default(), is_grown };
+        for found in each_kind(self.entities(), vessels) {
+            let kind = found.vessels.kind();
+            made_for.lineages[kind] = found.vessels.lineage();
+            made_for.nodes[kind] = found.vessels.tree().len();
+        }
+        made_for
+    }
+
+    /// Whether another flow is to be made than there is.
+    fn takes_note_of(&mut self, made_for: MadeFor) -> bool {
+        let mut is_new = self.state.made_for != Some(made_for);
+        if self.perfusion.is_changed() {
+            let made_with = Some(Perfusion { paused: false, ..Perfusion::clone(&self.perfusion) });
+            is_new |= self.state.made_with != made_with;
+            self.state.made_with = made_with;
+        }
+        is_new
+    }
+
+    /// Begins to make a flow: at once where that is quick. Large trees wait until they have grown.
+    fn begin(&mut self, made_for: MadeFor, vessels: &Query<Perfused>, messages: &mut BleedingMessages) {
+        let is_other = self.state.made_for.is_none_or(|before| before.lineages != made_for.lineages);
+        self.state.made_for = Some(made_for);
+        self.state.task = None;
+        self.state.error = None;
+        if is_other {
+            self.forget(vessels, messages);
+        }
+        if let Err(error) = self.follow_bleeding_settings() {
+            self.fail(error, &mut messages.failed);
+            return;
+        }
+        let nodes: usize = made_for.nodes.values().sum();
+        if nodes > AT_ONCE && !made_for.is_grown {
+            return;
+        }
+        let (trees, perfusion) = (self.trees(vessels), Perfusion::clone(&self.perfusion));
+        let links: Vec<BedLink> = match self.growth.and_then(GrowthState::growth) {
+            Some(growth) if perfusion.bed.resistance.is_some() => growth.bed_links().to_vec(),
+            _ => Vec::new(),
+        };
+        let make = move || OrganFlow::new(trees, &perfusion, &links);
+        if nodes > AT_ONCE {
+            let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
+            self.state.task = Some(pool.spawn(async move { make() }));
+        } else {
+            self.accept(make(), &mut messages.failed);
+        }
+    }
+
+    /// Copies of the trees at rest.
+    fn trees(&self, vessels: &Query<Perfused>) -> Trees {
+        let mut trees = Trees::default();
+        for found in each_kind(self.entities(), vessels) {
+            let tree = found.vessels.tree_at_rest();
+            trees[found.vessels.kind()] = (tree.len() > 1).then(|| tree.into_owned());
+        }
+        trees
+    }
+
+    /// Nothing is left of the blood in other vessels, whose ends are gone.
+    fn forget(&mut self, vessels: &Query<Perfused>, messages: &mut BleedingMessages) {
+        for found in each_kind(self.entities(), vessels) {
+            let kind = found.vessels.kind();
+            let ends = self.state.bleeding[kind].ends().iter().zip(&self.state.ends[kind]);
+            for (_, end) in ends.filter(|(flowing, _)| flowing.state == EndState::Bleeding) {
+                let (organ, vessels) = (self.entity, found.entity);
+                messages.stopped.write(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity: None });
+            }
+        }
+        let settings = *self.state.bleeding.artery.settings();
+        self.state.flow = None;
+        self.state.ends.values_mut().for_each(Vec::clear);
+        self.state.gauge = Gauge::default();
+        self.state.bleeding = ByKind::from_fn(|_| Bleeding::new(settings).unwrap_or_default());
+        self.loss.set_if_neq(BloodLoss::default());
+    }
+
+    /// Other settings of the bleeding begin the clotting anew.
+    fn follow_bleeding_settings(&mut self) -> Result<(), FlowError> {
+        let settings = self.perfusion.bleeding;
+        for bleeding in self.state.bleeding.values_mut() {
+            if *bleeding.settings() != settings {
+                *bleeding = Bleeding::new(settings)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn accept(&mut self, made: Result<OrganFlow, FlowError>, failed: &mut MessageWriter<CirculationFailed>) {
+        let is_grown = self.state.made_for.is_some_and(|made_for| made_for.is_grown);
+        if let Err(error) = made.and_then(|flow| self.state.take(flow, is_grown)) {
+            self.fail(error, failed);
+        }
+    }
+
+    /// The blood stands still until something changes.
+    pub(crate) fn fail(&mut self, error: FlowError, failed: &mut MessageWriter<CirculationFailed>) {
+        let organ = self.entity;
+        warn!("{organ}: its blood stands still: {error}");
+        self.state.task = None;
+        self.state.flow = None;
+        self.state.ends.values_mut().for_each(Vec::clear);
+        self.state.error = Some(error.clone());
+        *self.loss = BloodLoss { total: self.loss.total, ..BloodLoss::default() };
+        failed.write(CirculationFailed { organ, error });
+    }
+}
+
+/// The vessel entity of each kind; of several of one kind, the first.
+pub(crate) fn each_kind<'a>(
+    entities: &'a [Entity],
+    vessels: &'a Query<Perfused>,
+) -> impl Iterator<Item = PerfusedItem<'a, 'a>> {
+    let mut seen = ByKind::<bool>::default();
+    vessels.iter_many(entities).filter(move |found| !std::mem::replace(&mut seen[found.vessels.kind()], true))
+}
+
+/// An organ that is to have no blood any more.
+pub(crate) fn remove_circulation(
+    removed: On<Remove, Perfusion>,
+    organs: Query<&OrganVessels>,
+    vessels: Query<&OpenEndEntities>,
+    mut open_ends: Query<&mut OpenEnd>,
+    mut commands: Commands,
+) {
+    let entities = organs.get(removed.entity).map_or(&[][..], OrganVessels::entities);
+    for &entity in entities {
+        commands.entity(entity).try_remove::<SegmentSupply>();
+        for (_, end) in vessels.get(entity).iter().flat_map(|ends| ends.iter()) {
+            if let Ok(mut end) = open_ends.get_mut(end) {
+                end.dry();
+            }
+        }
+    }
+    commands.entity(removed.entity).queue_silenced(|mut organ: EntityWorldMut| {
+        organ.remove::<(CirculationState, BloodLoss, OrganSupply)>();
+    });
+}
+
+/// Vessels whose ledger is gone have no gaps: those that were laid are taken off.
+pub(crate) fn lay_again(
+    removed: On<Remove, VesselWounds>,
+    vessels: Query<&VesselsOf>,
+    mut organs: Query<&mut CirculationState>,
+) {
+    if let Ok(mut circulation) = vessels.get(removed.entity).and_then(|organ| organs.get_mut(organ.0)) {
+        circulation.is_unlaid = true;
+    }
+}

@@ -1,0 +1,63 @@
+//! Circulation: blood flows through an organ's vessels, leaves them where they are open, and reaches the tissue or doesn't.
+
+use crate::plugin::{
+    order::{self, VesselSystems},
+    surgery::SurgeryPlugin,
+};
+use bevy::{
+    app::{App, Plugin, Update},
+    ecs::{
+        intern::Interned,
+        schedule::{IntoScheduleConfigs, ScheduleLabel},
+    },
+};
+
+pub(crate) mod bleeding;
+pub(crate) mod flow;
+pub(crate) mod messages;
+mod organ_flow;
+pub(crate) mod patient;
+pub(crate) mod perfusion;
+mod supply;
+
+pub use flow::CirculationState;
+pub use messages::{BleedingStarted, BleedingStopped, CirculationFailed};
+pub use patient::Patient;
+pub use perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply};
+
+/// Lets blood flow through the vessels of organs with a [`Perfusion`]. Adds the [`SurgeryPlugin`], without which nothing
+/// would bleed.
+#[derive(Clone, Debug)]
+pub struct CirculationPlugin {
+    schedule: Interned<dyn ScheduleLabel>,
+}
+
+impl CirculationPlugin {
+    /// Runs in another schedule than `Update`.
+    #[must_use]
+    pub fn in_schedule(schedule: impl ScheduleLabel) -> Self {
+        Self { schedule: schedule.intern() }
+    }
+}
+
+impl Default for CirculationPlugin {
+    fn default() -> Self {
+        Self::in_schedule(Update)
+    }
+}
+
+impl Plugin for CirculationPlugin {
+    fn build(&self, app: &mut App) {
+        if !app.is_plugin_added::<SurgeryPlugin>() {
+            app.add_plugins(SurgeryPlugin::in_schedule(self.schedule));
+        }
+        order::configure(app, self.schedule);
+        app.add_message::<BleedingStarted>()
+            .add_message::<BleedingStopped>()
+            .add_message::<CirculationFailed>()
+            .add_observer(flow::remove_circulation)
+            .add_observer(flow::lay_again);
+        let circulate = (flow::prepare_organs, flow::make_flow, bleeding::bleed, supply::measure_supply);
+        app.add_systems(self.schedule, circulate.chain().in_set(VesselSystems::Circulate));
+    }
+}

@@ -1,0 +1,279 @@
+//! The blood of one organ, without an ECS: its networks, their gaps, and what its tissue gets.
+//!
+//! In: its trees at rest, a [`Perfusion`] and the ledgers of wounds. Out: bleeding over time,
+//! and the supply of segments and vertices.
+
+use crate::plugin::circulation::perfusion::Perfusion;
+use crate::synthesis::tree::ByKind;
+use crate::synthesis::{
+    haemodynamics::{
+        Bleeding, BloodVolume, Circulation, FlowError, Interruption, Network, Outlet, Supply, TissueSupply,
+    },
+    tree::{BedLink, NodeId, VesselKind, VesselTree},
+    units::Pressure,
+    wound::{Blockage, EndId, EndSide, Wounds},
+};
+use bevy::math::Vec3;
+use std::sync::Arc;
+
+/// The trees of an organ; `None` for a kind without vessels.
+pub(crate) type Trees = ByKind<Option<VesselTree>>;
+
+/// An open end that the flow knows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FlowingEnd {
+    pub(crate) node: NodeId,
+    pub(crate) side: EndSide,
+    pub(crate) id: EndId,
+}
+
+/// The networks of an organ.
+#[derive(Clone, Debug, Default)]
+struct Networks {
+    /// Arteries and veins, where the bed joins them.
+    joined: Option<Box<Circulation>>,
+    /// All other kinds, each by itself.
+    apart: ByKind<Option<Network>>,
+}
+
+impl Networks {
+    fn new(trees: &Trees, perfusion: &Perfusion, links: &[BedLink]) -> Result<Self, FlowError> {
+        let mut networks = Self::default();
+        for (kind, tree) in trees.iter() {
+            if let Some((tree, settings)) = tree.as_ref().zip(perfusion.flow_settings(kind)) {
+                networks.apart[kind] = Some(Network::new(tree, settings)?);
+            }
+        }
+        if perfusion.bed.resistance.is_some() && !links.is_empty() {
+            networks.join(links)?;
+        }
+        Ok(networks)
+    }
+
+    /// Joins arteries and veins through the bed, where there are both.
+    fn join(&mut self, links: &[BedLink]) -> Result<(), FlowError> {
+        let Self { joined, apart } = self;
+        match (apart.artery.take(), apart.vein.take()) {
+            (Some(arteries), Some(veins)) => {
+                // The growth may have gone on since the trees were published.
+                let is_there =
+                    |link: &&BedLink| link.arterial.index() < arteries.len() && link.venous.index() < veins.len();
+                let links: Vec<BedLink> = links.iter().filter(is_there).copied().collect();
+                *joined = Some(Box::new(Circulation::new(arteries, veins, &links)?));
+            }
+            (arteries, veins) => (apart.artery, apart.vein) = (arteries, veins),
+        }
+        Ok(())
+    }
+
+    fn get(&self, kind: VesselKind) -> Option<&Network> {
+        match (&self.joined, kind) {
+            (Some(joined), VesselKind::Artery) => Some(joined.arterial()),
+            (Some(joined), VesselKind::Vein) => Some(joined.venous()),
+            _ => self.apart[kind].as_ref(),
+        }
+    }
+
+    fn get_mut(&mut self, kind: VesselKind) -> Option<&mut Network> {
+        match (&mut self.joined, kind) {
+            (Some(joined), VesselKind::Artery) => Some(joined.arterial_mut()),
+            (Some(joined), VesselKind::Vein) => Some(joined.venous_mut()),
+            _ => self.apart[kind].as_mut(),
+        }
+    }
+
+    /// Holds bed and roots at a share of the pressure that the settings give them, that of a pulse in the mean.
+    fn hold_at(&mut self, share: f64) -> Result<(), FlowError> {
+        let lowered = |pressure: Pressure| Pressure::from_pascals(pressure.pascals() * share);
+        for kind in VesselKind::ALL {
+            let Some(network) = self.get_mut(kind) else { continue };
+            let (bed, root) = (network.settings().bed.pressure, network.settings().root.mean());
+            network.set_bed_pressure(lowered(bed))?;
+            network.set_root_pressure(lowered(root))?;
+        }
+        Ok(())
+    }
+
+    fn solve(&mut self) -> Result<(), FlowError> {
+        if let Some(joined) = &mut self.joined {
+            joined.solve()?;
+        }
+        self.apart.values_mut().flatten().try_for_each(Network::solve)
+    }
+}
+
+/// The flow in an organ's vessels.
+#[derive(Debug)]
+pub(crate) struct OrganFlow {
+    networks: Networks,
+    trees: Arc<Trees>,
+}
+
+impl OrganFlow {
+    /// The flow in the intact vessels.
+    pub(crate) fn new(trees: Trees, perfusion: &Perfusion, links: &[BedLink]) -> Result<Self, FlowError> {
+        Ok(Self { networks: Networks::new(&trees, perfusion, links)?, trees: Arc::new(trees) })
+    }
+
+    /// Lays the gaps of an earlier flow of the same vessels over this one, so that its holes stay as they are.
+    pub(crate) fn keep_gaps_of(&mut self, before: &Self) -> Result<(), FlowError> {
+        for kind in VesselKind::ALL {
+            let (Some(network), Some(before)) = (self.networks.get_mut(kind), before.networks.get(kind)) else {
+                continue;
+            };
+            let gaps: Vec<_> = before.interruptions().filter(|(node, _)| node.index() < network.len()).collect();
+            network.set_interruptions(&gaps)?;
+        }
+        Ok(())
+    }
+
+    /// Lays the gaps of a ledger over a kind's network, in place of those that were.
+    ///
+    /// Returns its open ends in the order of the network's. Segments that grew since are passed over.
+    pub(crate) fn lay(&mut self, kind: VesselKind, wounds: &Wounds) -> Result<Vec<FlowingEnd>, FlowError> {
+        let (Some(tree), Some(network)) = (&self.trees[kind], self.networks.get_mut(kind)) else {
+            return Ok(Vec::new());
+        };
+        let (mut gaps, mut ends) = (Vec::new(), Vec::new());
+        for blockage in wounds.blockages().filter(|blockage| blockage.node.index() < network.len()) {
+            let node = blockage.node;
+            gaps.push((node, interruption(&blockage, tree.radii()[node.index()], network.interruption(node))));
+            let end = |side, id: Option<EndId>| id.map(|id| FlowingEnd { node, side, id });
+            ends.extend(end(EndSide::Proximal, blockage.proximal));
+            ends.extend(end(EndSide::Distal, blockage.distal));
+        }
+        network.set_interruptions(&gaps)?;
+        Ok(ends)
+    }
+
+    /// Bleeds for a time. 0 seconds only tell how fast.
+    pub(crate) fn step(
+        &mut self,
+        bleeding: &mut ByKind<Bleeding>,
+        seconds: f64,
+        blood: &mut BloodVolume,
+    ) -> Result<(), FlowError> {
+        let Networks { joined, apart } = &mut self.networks;
+        if let Some(joined) = joined {
+            Bleeding::step_joined([&mut bleeding.artery, &mut bleeding.vein], joined, seconds, blood)?;
+        }
+        for (network, bleeding) in apart.values_mut().zip(bleeding.values_mut()) {
+            if let Some(network) = network {
+                bleeding.step(network, seconds, blood)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of nodes of all networks.
+    pub(crate) fn nodes(&self) -> usize {
+        VesselKind::ALL.iter().filter_map(|&kind| self.networks.get(kind)).map(Network::len).sum()
+    }
+
+    /// A copy to measure with.
+    pub(crate) fn copy(&self) -> Self {
+        Self { networks: self.networks.clone(), trees: Arc::clone(&self.trees) }
+    }
+
+    /// How the vessels are now, for a copy to be made equal: as much as there are gaps, however many vessels.
+    pub(crate) fn condition(&self, blood: &BloodVolume) -> Condition {
+        let of_kinds = ByKind::from_fn(|kind| match self.networks.get(kind) {
+            Some(network) => {
+                let openings = network.open_ends().iter().map(|end| end.opening).collect();
+                (network.interruptions().collect(), openings)
+            }
+            None => <(Vec<_>, Vec<_>)>::default(),
+        });
+        Condition { of_kinds, pressure_share: blood.pressure_share() }
+    }
+
+    /// Makes this copy equal to the flow that a condition is of, at the mean of the pulse, and solves it altogether.
+    fn solve_in(&mut self, condition: &Condition) -> Result<(), FlowError> {
+        for (kind, (gaps, openings)) in condition.of_kinds.iter() {
+            let Some(network) = self.networks.get_mut(kind) else { continue };
+            network.set_interruptions(gaps)?;
+            openings.iter().enumerate().try_for_each(|(end, &share)| network.set_opening(end, share))?;
+        }
+        self.networks.hold_at(condition.pressure_share)?;
+        self.networks.solve()
+    }
+}
+
+/// What the flow in an organ depends on, its intact vessels aside.
+#[derive(Clone, Debug)]
+pub(crate) struct Condition {
+    /// Gaps of each kind, and how far each of its open ends is open.
+    of_kinds: ByKind<(Vec<(NodeId, Interruption)>, Vec<f64>)>,
+    /// How much of their pressure the patient's roots have left.
+    pressure_share: f64,
+}
+
+/// What an organ's tissue gets, against the intact organ.
+#[derive(Debug)]
+pub(crate) struct SupplyGauge {
+    /// A copy of its own, so that measuring holds up no frame.
+    flow: OrganFlow,
+    of_kinds: ByKind<Supply>,
+    tissue: Option<TissueSupply>,
+}
+
+/// A measurement of the supply.
+#[derive(Debug)]
+pub(crate) struct Measured {
+    /// By segment, of each kind.
+    pub(crate) segments: ByKind<Vec<f32>>,
+    /// By vertex of the organ.
+    pub(crate) vertices: Vec<f32>,
+    pub(crate) ischaemic_share: f32,
+}
+
+impl SupplyGauge {
+    /// Measures from now on against what flows in the intact vessels of `flow`, whose gaps don't count. `vertices` are
+    /// the organ's, at rest.
+    pub(crate) fn new(mut flow: OrganFlow, vertices: &[Vec3]) -> Result<Self, FlowError> {
+        flow.solve_in(&Condition { of_kinds: ByKind::default(), pressure_share: 1.0 })?;
+        let supply = |kind: VesselKind| {
+            let (tree, network) = (flow.trees[kind].as_ref(), flow.networks.get(kind));
+            tree.zip(network).map_or_else(Supply::default, |(tree, network)| Supply::against(tree, network))
+        };
+        let arteries = flow.trees.artery.as_ref();
+        let tissue = arteries.filter(|_| !vertices.is_empty()).map(|tree| TissueSupply::new(tree, vertices));
+        Ok(Self { of_kinds: ByKind::from_fn(supply), tissue, flow })
+    }
+
+    /// Measures the vessels in a condition.
+    pub(crate) fn measure(&mut self, condition: &Condition, ischaemic_below: f32) -> Result<Measured, FlowError> {
+        let flow = &mut self.flow;
+        flow.solve_in(condition)?;
+        let mut share = 0.0;
+        for (kind, supply) in VesselKind::ALL.into_iter().zip(self.of_kinds.values_mut()) {
+            let (Some(tree), Some(network)) = (&flow.trees[kind], flow.networks.get(kind)) else { continue };
+            supply.update(tree, network);
+            if kind == VesselKind::Artery {
+                share = supply.ischaemic_share(tree, ischaemic_below);
+            }
+        }
+        if let Some(tissue) = &mut self.tissue {
+            tissue.update(self.of_kinds.artery.segments());
+        }
+        Ok(Measured {
+            segments: self.of_kinds.as_ref().map(|_, supply| supply.segments().to_vec()),
+            vertices: self.tissue.as_ref().map_or_else(Vec::new, |tissue| tissue.vertices().to_vec()),
+            ischaemic_share: share,
+        })
+    }
+}
+
+/// What a blockage in the ledger is to the flow.
+///
+/// A hole keeps the radius that it was laid with, however its vessel has widened since, so that a clot in it stays.
+fn interruption(blockage: &Blockage, radius: f32, laid: Option<Interruption>) -> Interruption {
+    let new = blockage.interruption(radius);
+    let keep = |now: Option<Outlet>, before: Option<Outlet>| now.and(before.or(now));
+    match laid {
+        Some(laid) if (laid.first, laid.last) == (new.first, new.last) => {
+            Interruption { proximal: keep(new.proximal, laid.proximal), distal: keep(new.distal, laid.distal), ..new }
+        }
+        _ => new,
+    }
+}

@@ -1,0 +1,151 @@
+//! What makes blood flow in an organ's vessels, and what is known of it: settings, loss and supply.
+
+use crate::plugin::{circulation::flow::CirculationState, surgery::ledgers::Cuttable};
+use crate::synthesis::{
+    haemodynamics::{BedSettings, BleedingSettings, FlowSettings, RootPressure, ViscosityLaw},
+    tree::{ByKind, VesselKind},
+    units::{Flow, Pressure, Scale, Volume},
+};
+use bevy::{
+    ecs::{component::Component, reflect::ReflectComponent},
+    reflect::{Reflect, std_traits::ReflectDefault},
+};
+
+/// Fills an organ's vessels with blood: put it beside the organ's [`Vasculature`](crate::plugin::Vasculature), and what
+/// is cut open bleeds.
+///
+/// Blood flows once the vessels have grown; those of fewer than 8192 nodes while they grow, too. As long as nothing is
+/// open it costs nothing. A change of a setting takes effect at the next frame: what is open goes on bleeding, but other
+/// settings of the bleeding begin the clotting anew. Of several vessel entities of one kind the first has blood.
+///
+/// Flow is that of the organ at rest: neither its transform nor its deformation changes it.
+///
+/// ```
+/// # use bevy_vessels::{plugin::{Perfusion, Vasculature}, synthesis::{preset::PresetName, units::Scale}};
+/// let organ = (
+///     Vasculature::new(PresetName::Colon),
+///     Perfusion { scale: Scale::MILLIMETRES, ..Perfusion::default() },
+/// );
+/// ```
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+#[require(Cuttable, CirculationState, BloodLoss, OrganSupply)]
+pub struct Perfusion {
+    /// How long a unit of the organ's mesh is. Flow rises with its cube: a wrong scale shows at once.
+    ///
+    /// The scale of the organ's transform doesn't count. Default: [`Scale::METRES`], as in glTF files and Bevy's worlds.
+    pub scale: Scale,
+    /// How viscosity depends on the diameter. Default: [`ViscosityLaw::IN_VIVO`].
+    pub viscosity: ViscosityLaw,
+    /// Pressure at the arteries' roots; a [`Pulse`](crate::synthesis::haemodynamics::Pulse) makes them spurt.
+    ///
+    /// Default: constant, [`FlowSettings::DEFAULT_ARTERIAL_PRESSURE`].
+    pub arterial_pressure: RootPressure,
+    /// Pressure at the veins' roots. Default: constant, [`FlowSettings::DEFAULT_VENOUS_PRESSURE`].
+    pub venous_pressure: RootPressure,
+    /// Pressure at the portal veins' roots. Default: constant, [`FlowSettings::DEFAULT_PORTAL_PRESSURE`].
+    pub portal_pressure: RootPressure,
+    /// The bed behind the portal veins' terminals, the sinusoids of the liver. No links join it to other vessels.
+    ///
+    /// Default: at [`FlowSettings::DEFAULT_SINUSOID_PRESSURE`], without a resistance.
+    pub portal_bed: BedSettings,
+    /// The capillary bed behind the terminals of arteries and veins.
+    ///
+    /// With a resistance, arteries and veins of an organ that grew are joined where an artery supplied a drain that a
+    /// vein then drained, so that one side feels what the other loses; each frame then takes several sweeps over both
+    /// trees. Without, each side drains into the bed by itself, and a frame costs only as much as there are open ends.
+    ///
+    /// Default: without a resistance.
+    pub bed: BedSettings,
+    /// Pressure outside the vessels. Default: that of the air, 0.
+    pub ambient: Pressure,
+    /// Discharge coefficient of open ends. Limits: > 0, at most 1. Default:
+    /// [`FlowSettings::DEFAULT_DISCHARGE_COEFFICIENT`].
+    pub discharge_coefficient: f32,
+    /// How open ends bleed and clot.
+    pub bleeding: BleedingSettings,
+    /// Supply below which tissue counts as ischaemic. Limits: 0 to 1. Default: [`Self::DEFAULT_ISCHAEMIC_BELOW`].
+    pub ischaemic_below: f32,
+    /// Least time between two measurements of the supply while something bleeds; after an action it is measured at once.
+    /// Each is a sweep over the whole tree, for large ones beside the frames.
+    ///
+    /// Units: seconds. Limits: ≥ 0. Default: [`Self::DEFAULT_SUPPLY_INTERVAL`].
+    pub supply_interval: f32,
+    /// Whether time stands still for the blood of this organ. Default: false.
+    pub paused: bool,
+}
+
+impl Perfusion {
+    /// Default of [`ischaemic_below`](Self::ischaemic_below): half of what the intact organ has.
+    pub const DEFAULT_ISCHAEMIC_BELOW: f32 = 0.5;
+    /// Default of [`supply_interval`](Self::supply_interval), in seconds.
+    pub const DEFAULT_SUPPLY_INTERVAL: f32 = 0.5;
+
+    /// What the flow in vessels of a kind depends on; `None` for those that carry no blood.
+    pub fn flow_settings(&self, kind: VesselKind) -> Option<FlowSettings> {
+        let (root, bed) = match kind {
+            VesselKind::Artery => (self.arterial_pressure, self.bed),
+            VesselKind::Vein => (self.venous_pressure, self.bed),
+            VesselKind::PortalVein => (self.portal_pressure, self.portal_bed),
+            VesselKind::Duct => return None,
+        };
+        let Self { scale, viscosity, ambient, discharge_coefficient, .. } = *self;
+        Some(FlowSettings { scale, viscosity, root, bed, ambient, discharge_coefficient })
+    }
+}
+
+impl Default for Perfusion {
+    fn default() -> Self {
+        let (arterial, venous, portal) = (FlowSettings::arterial(), FlowSettings::venous(), FlowSettings::portal());
+        Self {
+            scale: Scale::METRES,
+            viscosity: arterial.viscosity,
+            arterial_pressure: arterial.root,
+            venous_pressure: venous.root,
+            portal_pressure: portal.root,
+            portal_bed: portal.bed,
+            bed: arterial.bed,
+            ambient: arterial.ambient,
+            discharge_coefficient: arterial.discharge_coefficient,
+            bleeding: BleedingSettings::default(),
+            ischaemic_below: Self::DEFAULT_ISCHAEMIC_BELOW,
+            supply_interval: Self::DEFAULT_SUPPLY_INTERVAL,
+            paused: false,
+        }
+    }
+}
+
+/// What an organ bleeds. For reading: the plugin writes it, and goes on from what it finds, so that inserting a new one
+/// begins the count anew.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct BloodLoss {
+    /// All that it has lost.
+    pub total: Volume,
+    /// What it loses, as a mean over the last frame.
+    pub rate: Flow,
+    /// The same of each kind of vessels.
+    pub rates: ByKind<Flow>,
+    /// Number of ends that bleed.
+    pub bleeding_ends: usize,
+}
+
+/// How much blood reaches the tissue of an organ, against the intact organ. For reading: the plugin writes it.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct OrganSupply {
+    /// Supply of every vertex of the organ's mesh by the arteries, from 0 to 1. Empty until it has been measured, and
+    /// for an organ without a mesh.
+    pub vertices: Vec<f32>,
+    /// Share of the bed that gets less than [`Perfusion::ischaemic_below`], from 0 to 1.
+    pub ischaemic_share: f32,
+}
+
+/// How much blood flows through the segments of a vessel entity, against the intact vessels. For reading: the plugin
+/// writes it.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct SegmentSupply {
+    /// Supply of every segment by the node that it ends in, from 0 to 1. Segments that grew later are missing.
+    pub segments: Vec<f32>,
+}

@@ -1,0 +1,212 @@
+//! Circulate: which tissue still gets blood.
+//!
+//! In: the flow of an organ. Out: [`SegmentSupply`] on its vessel entities and [`OrganSupply`] on the organ, after each
+//! action and, while something bleeds, now and then. For large organs it is measured in the task pool.
+
+use crate::plugin::vessels::tree::Vessels;
+use crate::plugin::{
+    circulation::{
+        flow::{AT_ONCE, CirculationState},
+        organ_flow::{Condition, Measured, OrganFlow, SupplyGauge},
+        patient::{Patient, patient_of},
+        perfusion::{OrganSupply, Perfusion, SegmentSupply},
+    },
+    organ::{mesh::vertex_positions, rest::RestMesh},
+    vessels::relations::OrganVessels,
+};
+use crate::synthesis::haemodynamics::FlowError;
+use bevy::{
+    asset::Assets,
+    ecs::{
+        change_detection::{DetectChangesMut, Res},
+        entity::Entity,
+        hierarchy::ChildOf,
+        query::QueryData,
+        system::Query,
+    },
+    log::warn,
+    math::Vec3,
+    mesh::{Mesh, Mesh3d},
+    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
+};
+
+/// A gauge, with what it has measured.
+type Outcome = Result<(Box<SupplyGauge>, Measured), FlowError>;
+
+/// When the supply of an organ is measured, and with what.
+#[derive(Debug, Default)]
+pub(crate) struct Gauge {
+    /// `None` before the first measurement, and while the task has it.
+    gauge: Option<Box<SupplyGauge>>,
+    task: Option<Task<Outcome>>,
+    /// Whether the organ's vessels have grown, so that there is something to measure.
+    is_ready: bool,
+    /// Whether something was done to the vessels since it was measured.
+    is_due: bool,
+    /// Seconds since it was measured.
+    age: f64,
+    /// Whether blood was lost since.
+    bled: bool,
+}
+
+impl Gauge {
+    /// Measures as soon as can be.
+    pub(crate) fn ready() -> Self {
+        Self { is_ready: true, is_due: true, ..Self::default() }
+    }
+
+    /// Measures after an action.
+    pub(crate) fn demand(&mut self) {
+        self.is_due = true;
+    }
+
+    /// Takes note of time that passed.
+    pub(crate) fn pass(&mut self, seconds: f64, bled: bool) {
+        self.age += seconds;
+        self.bled |= bled;
+    }
+
+    fn is_to_begin(&self, interval: f32) -> bool {
+        let is_old = self.bled && self.age >= f64::from(interval);
+        self.is_ready && self.task.is_none() && (self.is_due || is_old)
+    }
+
+    /// Hands out what is measured with, and begins to count anew.
+    fn begin(&mut self) -> Option<Box<SupplyGauge>> {
+        let gauge = self.gauge.take();
+        *self = Self { is_ready: true, ..Self::default() };
+        gauge
+    }
+
+    /// What has been measured, and keeps what it was measured with.
+    fn accept(&mut self, outcome: Outcome) -> Result<Measured, FlowError> {
+        let (gauge, measured) = outcome?;
+        self.gauge = Some(gauge);
+        Ok(measured)
+    }
+}
+
+/// All that a measurement takes.
+struct Order {
+    source: Source,
+    condition: Condition,
+    ischaemic_below: f32,
+}
+
+/// What is measured with: the first time, it is to be made from a copy of the flow and the organ's vertices.
+enum Source {
+    Gauge(Box<SupplyGauge>),
+    New { flow: OrganFlow, vertices: Vec<Vec3> },
+}
+
+impl Order {
+    fn carry_out(self) -> Outcome {
+        let mut gauge = match self.source {
+            Source::Gauge(gauge) => gauge,
+            Source::New { flow, vertices } => Box::new(SupplyGauge::new(flow, &vertices)?),
+        };
+        let measured = gauge.measure(&self.condition, self.ischaemic_below)?;
+        Ok((gauge, measured))
+    }
+}
+
+/// An organ whose supply is measured.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct Supplied {
+    entity: Entity,
+    perfusion: &'static Perfusion,
+    vessels: &'static OrganVessels,
+    state: &'static mut CirculationState,
+    supply: &'static mut OrganSupply,
+    mesh: Option<&'static Mesh3d>,
+    rest: Option<&'static RestMesh>,
+}
+
+/// Begins measurements that are due, and writes those that have ended.
+pub(crate) fn measure_supply(
+    mut organs: Query<Supplied>,
+    mut vessels: Query<(&Vessels, &mut SegmentSupply)>,
+    patients: Query<&Patient>,
+    parents: Query<&ChildOf>,
+    meshes: Option<Res<Assets<Mesh>>>,
+) {
+    for mut organ in &mut organs {
+        if !organ.state.gauge.is_ready {
+            organ.clear(&mut vessels);
+            continue;
+        }
+        let outcome = if organ.state.gauge.is_to_begin(organ.perfusion.supply_interval) {
+            let patient = patient_of(organ.entity, &parents, |entity| patients.contains(entity));
+            let patient = patient.and_then(|patient| patients.get(patient).ok()).copied().unwrap_or_default();
+            organ.begin(&patient, meshes.as_deref())
+        } else {
+            organ.state.bypass_change_detection().gauge.task.as_mut().and_then(check_ready)
+        };
+        if let Some(outcome) = outcome {
+            organ.accept(outcome, &mut vessels);
+        }
+    }
+}
+
+impl SuppliedItem<'_, '_> {
+    /// Begins a measurement. Gives the outcome of one that was quick.
+    fn begin(&mut self, patient: &Patient, meshes: Option<&Assets<Mesh>>) -> Option<Outcome> {
+        let state = self.state.bypass_change_detection();
+        let condition = state.flow()?.condition(&patient.blood);
+        let gauge = state.gauge.begin();
+        let flow = state.flow()?;
+        let mut work = flow.nodes();
+        let source = match gauge {
+            Some(gauge) => Source::Gauge(gauge),
+            None => {
+                let (flow, vertices) = (flow.copy(), self.vertices(meshes));
+                work += vertices.len();
+                Source::New { flow, vertices }
+            }
+        };
+        let order = Order { source, condition, ischaemic_below: self.perfusion.ischaemic_below };
+        if work <= AT_ONCE {
+            return Some(order.carry_out());
+        }
+        let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
+        self.state.bypass_change_detection().gauge.task = Some(pool.spawn(async move { order.carry_out() }));
+        None
+    }
+
+    /// The organ's vertices, at rest where it is known how that is; none without a mesh that can be read.
+    fn vertices(&self, meshes: Option<&Assets<Mesh>>) -> Vec<Vec3> {
+        if let Some(rest) = self.rest.and_then(RestMesh::positions) {
+            return rest.to_vec();
+        }
+        let mesh = self.mesh.zip(meshes).and_then(|(mesh, meshes)| meshes.get(mesh.id()));
+        mesh.and_then(vertex_positions)
+            .map_or_else(Vec::new, |positions| positions.iter().map(|&at| at.into()).collect())
+    }
+
+    /// Nothing is known of vessels that grow.
+    fn clear(&mut self, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
+        self.supply.set_if_neq(OrganSupply::default());
+        let mut vessels = vessels.iter_many_mut(self.vessels.entities());
+        while let Some((_, mut supply)) = vessels.fetch_next() {
+            supply.set_if_neq(SegmentSupply::default());
+        }
+    }
+
+    fn accept(&mut self, outcome: Outcome, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
+        let gauge = &mut self.state.bypass_change_detection().gauge;
+        gauge.task = None;
+        let mut measured = match gauge.accept(outcome) {
+            Ok(measured) => measured,
+            Err(error) => {
+                warn!("{}: its supply is not measured: {error}", self.entity);
+                return;
+            }
+        };
+        *self.supply = OrganSupply { vertices: measured.vertices, ischaemic_share: measured.ischaemic_share };
+        let mut vessels = vessels.iter_many_mut(self.vessels.entities());
+        while let Some((vessels, mut supply)) = vessels.fetch_next() {
+            supply.segments = std::mem::take(&mut measured.segments[vessels.kind()]);
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Vessels bound to an organ at rest, and moved with it.
+//!
+//! In: the organ at rest, and where its vertices are. Out: [`Vessels`] with moved nodes, and all that goes by where they
+//! are. Binding is done in the task pool for large organs.
+
+use crate::plugin::{
+    circulation::flow::AT_ONCE,
+    organ::mesh::MeshCopy,
+    vessels::{
+        change_log::SegmentChanges,
+        index::VesselIndex,
+        tree::{Lineage, Vessels},
+    },
+};
+use crate::synthesis::{
+    binding::{Binding, BindingError},
+    mesh::{TetMesh, TriangleMesh},
+    tree::VesselTree,
+};
+use bevy::{
+    camera::primitives::Aabb,
+    ecs::{
+        change_detection::{DetectChanges, DetectChangesMut},
+        component::Component,
+        entity::Entity,
+        query::QueryData,
+        system::Query,
+    },
+    math::Vec3,
+    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
+};
+use std::sync::Arc;
+
+/// An organ at rest: what nodes are bound to.
+#[derive(Clone)]
+pub(crate) enum RestOrgan {
+    Surface(Arc<MeshCopy>),
+    Solid(Arc<TetMesh>),
+}
+
+impl RestOrgan {
+    /// Triangles or tetrahedra.
+    fn elements(&self) -> usize {
+        match self {
+            Self::Surface(mesh) => mesh.triangles.len(),
+            Self::Solid(mesh) => mesh.tetrahedra().len(),
+        }
+    }
+
+    /// `None` where it is no organ. The tissue is prepared from the same triangles, and says what is wrong with them.
+    fn bind(&self, tree: &VesselTree) -> Option<Binding> {
+        match self {
+            Self::Surface(mesh) => {
+                let mesh = TriangleMesh::new(mesh.positions.clone(), mesh.triangles.clone(), None).ok()?;
+                Some(Binding::to_surface(tree, &mesh))
+            }
+            Self::Solid(mesh) => Some(Binding::to_tetrahedra(tree, mesh)),
+        }
+    }
+}
+
+/// The nodes of a vessel entity, bound to their organ at rest.
+#[derive(Component, Debug, Default)]
+pub(crate) struct VesselBinding {
+    binding: Option<Binding>,
+    task: Option<Task<Option<Binding>>>,
+    /// What it was made for.
+    made_for: Option<MadeFor>,
+}
+
+/// What a binding is made for. Nodes shift a little while they grow, so grown ones are bound again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct MadeFor {
+    vessels: Lineage,
+    organ: Lineage,
+    is_grown: bool,
+}
+
+/// Vessels that follow.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct Bound {
+    vessels: &'static mut Vessels,
+    binding: &'static mut VesselBinding,
+    changes: &'static mut SegmentChanges,
+    aabb: Option<&'static mut Aabb>,
+    index: Option<&'static mut VesselIndex>,
+}
+
+/// How an organ has moved in a frame.
+pub(crate) struct Motion<'a> {
+    pub(crate) rest: RestOrgan,
+    /// Tells this organ at rest from others.
+    pub(crate) lineage: Lineage,
+    /// Whether its vessels have grown.
+    pub(crate) is_grown: bool,
+    /// Whether vertices are elsewhere than in the last frame.
+    pub(crate) has_moved: bool,
+    /// Where they are, `None` for at rest.
+    pub(crate) vertices: Option<&'a [Vec3]>,
+}
+
+impl Motion<'_> {
+    /// Moves an organ's vessel entities as far as that is due. One that can't be moved doesn't keep the others from it.
+    pub(crate) fn carry_along(&self, vessels: &[Entity], bound: &mut Query<Bound>) -> Result<(), BindingError> {
+        let mut outcome = Ok(());
+        let mut each = bound.iter_many_mut(vessels);
+        while let Some(mut vessels) = each.fetch_next() {
+            let is_new = vessels.bind(self);
+            if self.has_moved || is_new || vessels.vessels.is_changed() {
+                outcome = outcome.and(vessels.follow(self.vertices));
+            }
+        }
+        outcome
+    }
+}
+
+impl BoundItem<'_, '_> {
+    /// Binds the vessels to the organ at rest where that is due: at once where it is quick. Says whether there is a new
+    /// binding.
+    fn bind(&mut self, motion: &Motion) -> bool {
+        let made_for = MadeFor { vessels: self.vessels.lineage(), organ: motion.lineage, is_grown: motion.is_grown };
+        let binding = &mut *self.binding;
+        if binding.made_for != Some(made_for) && !self.vessels.tree().is_empty() {
+            let is_other = binding
+                .made_for
+                .is_none_or(|before| (before.vessels, before.organ) != (made_for.vessels, made_for.organ));
+            if is_other {
+                binding.binding = None;
+            }
+            binding.made_for = Some(made_for);
+            let (tree, rest) = (self.vessels.tree_at_rest().into_owned(), motion.rest.clone());
+            if tree.len() + rest.elements() > AT_ONCE {
+                let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
+                binding.task = Some(pool.spawn(async move { rest.bind(&tree) }));
+            } else {
+                binding.task = None;
+                binding.binding = rest.bind(&tree);
+                return true;
+            }
+        }
+        let Some(bound) = binding.task.as_mut().and_then(check_ready) else { return false };
+        binding.task = None;
+        binding.binding = bound;
+        true
+    }
+
+    /// Moves the vessels with the vertices; `None` for back to rest.
+    fn follow(&mut self, vertices: Option<&[Vec3]>) -> Result<(), BindingError> {
+        match (vertices, &mut self.binding.binding) {
+            (None, _) => self.come_to_rest(),
+            (Some(vertices), Some(binding)) => {
+                self.vessels.bypass_change_detection().deform(binding, vertices)?;
+                self.note_moved();
+            }
+            (Some(_), None) => {}
+        }
+        Ok(())
+    }
+
+    /// Brings the vessels back to where they grew.
+    pub(crate) fn come_to_rest(&mut self) {
+        if self.vessels.bypass_change_detection().come_to_rest() {
+            self.note_moved();
+        }
+    }
+
+    fn note_moved(&mut self) {
+        self.vessels.set_changed();
+        self.changes.mark_all();
+        if let Some(aabb) = &mut self.aabb {
+            aabb.set_if_neq(self.vessels.aabb());
+        }
+        if let Some(index) = &mut self.index {
+            index.note_moved(&self.vessels, None);
+        }
+    }
+}

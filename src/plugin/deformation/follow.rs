@@ -1,0 +1,242 @@
+//! Vessels follow an organ that is deformed: its mesh, or the tetrahedra of its inside.
+//!
+//! In: the organ's mesh asset or its [`FollowsTetrahedra`], whose positions someone writes. Out: [`Vessels`] with moved
+//! nodes. Growth goes on at rest: what grows is bound to the organ as it was then, and moved from there.
+
+use crate::plugin::organ::rest::RestMesh;
+use crate::plugin::{
+    deformation::bound::{Bound, Motion, RestOrgan, VesselBinding},
+    growth::{progress::GrowthProgress, state::GrowthState},
+    organ::mesh::{copy_mesh, vertex_positions},
+    vessels::{
+        relations::OrganVessels,
+        tree::{Lineage, Vessels},
+    },
+};
+use crate::synthesis::mesh::TetMesh;
+use bevy::{
+    asset::Assets,
+    ecs::{
+        change_detection::{DetectChanges, DetectChangesMut, Res},
+        component::Component,
+        entity::Entity,
+        lifecycle::Remove,
+        observer::On,
+        query::{Has, Or, QueryData, With, Without},
+        reflect::ReflectComponent,
+        system::{Commands, Query},
+        world::{EntityWorldMut, Ref},
+    },
+    math::Vec3,
+    mesh::{Mesh, Mesh3d},
+    reflect::{Reflect, std_traits::ReflectDefault},
+};
+use std::sync::Arc;
+
+/// Lets an organ's vessels follow its mesh: put it beside the organ's [`Vasculature`](crate::plugin::Vasculature), and
+/// write new positions of the vertices into the mesh asset, each frame if need be, as a soft body does.
+///
+/// New positions no longer start the growth again; another number of vertices, or another mesh asset, still does. The
+/// organ is at rest as its mesh is when its tissue is prepared, or when this is added later. Vessels may still grow: they
+/// do so at rest, and are moved from there.
+///
+/// Write the mesh before [`VesselSystems::Publish`](crate::plugin::VesselSystems::Publish), and the vessels follow in the
+/// same frame; later, they follow in the next. The mesh must keep its data in main memory
+/// (`RenderAssetUsages::MAIN_WORLD`), and have its own asset: organs that share one move alike. Radii, flow and what is
+/// ischaemic stay as they are at rest. Removing this brings the vessels back to rest.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+#[require(RestMesh)]
+pub struct FollowsMesh;
+
+/// Lets an organ's vessels follow tetrahedra that fill it, as a soft body has them: put it beside the organ's
+/// [`Vasculature`](crate::plugin::Vasculature), and write [`positions_mut`](Self::positions_mut) each frame.
+///
+/// Vessels inside a solid organ move with the tissue around them, where [`FollowsMesh`] knows its surface alone. Each node
+/// follows the tetrahedron that holds it: exactly, where that is stretched and sheared. Nodes outside all of them, such as
+/// those of vessels that stand off the surface, follow the nearest.
+///
+/// All positions are in the local space of the organ's mesh, and [`rest`](Self::rest) is the organ in which vessels grow.
+/// The mesh may be deformed as well, by whoever draws it: as with [`FollowsMesh`], that doesn't start the growth again. An
+/// organ with both follows the tetrahedra. To change the tetrahedra themselves, after a remeshing for example, insert
+/// another one of these, with the tetrahedra as they lie in the organ at rest.
+///
+/// Written before [`VesselSystems::Publish`](crate::plugin::VesselSystems::Publish), vessels follow in the same frame. Radii,
+/// flow and what is ischaemic stay as they are at rest. Removing this brings the vessels back to rest.
+///
+/// ```
+/// # use bevy_vessels::{plugin::FollowsTetrahedra, synthesis::binding::{TetMesh, TetMeshError}};
+/// # use bevy::prelude::{Query, Vec3};
+/// fn tetrahedra() -> Result<FollowsTetrahedra, TetMeshError> {
+///     let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+///     Ok(FollowsTetrahedra::new(TetMesh::new(corners, vec![[0, 1, 2, 3]])?))
+/// }
+///
+/// fn sag(mut organs: Query<&mut FollowsTetrahedra>) {
+///     for mut organ in &mut organs {
+///         organ.positions_mut().iter_mut().for_each(|at| at.y -= 0.001);
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(sag);
+/// # assert!(tetrahedra().is_ok());
+/// ```
+#[derive(Component, Clone, Debug)]
+#[require(RestMesh)]
+pub struct FollowsTetrahedra {
+    rest: Arc<TetMesh>,
+    lineage: Lineage,
+    positions: Vec<Vec3>,
+}
+
+impl FollowsTetrahedra {
+    /// Tetrahedra that are at rest. [`TetMesh::new`] says what is wrong with those that can't be followed.
+    pub fn new(rest: impl Into<Arc<TetMesh>>) -> Self {
+        let rest = rest.into();
+        Self { lineage: Lineage::new_one(), positions: rest.positions().to_vec(), rest }
+    }
+
+    /// The tetrahedra at rest.
+    pub fn rest(&self) -> &TetMesh {
+        &self.rest
+    }
+
+    /// Where the vertices of the tetrahedra are.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The same, to be written. Where one isn't finite nothing moves, and the log says so once.
+    pub fn positions_mut(&mut self) -> &mut [Vec3] {
+        &mut self.positions
+    }
+}
+
+/// Organs whose vessels follow them.
+type Deforming = Or<(With<FollowsMesh>, With<FollowsTetrahedra>)>;
+
+/// Source: an organ is at rest as it is when its tissue is prepared.
+pub(crate) fn take_rest(
+    meshes: Res<Assets<Mesh>>,
+    mut organs: Query<(Entity, &Mesh3d, Option<&GrowthState>, &mut RestMesh), Deforming>,
+) {
+    for (organ, mesh, growth, mut rest) in &mut organs {
+        let tissue = growth.map(GrowthState::tissue_lineage).unwrap_or_default();
+        if rest.copy.is_some() && rest.tissue == tissue {
+            continue;
+        }
+        let Some(mesh) = meshes.get(mesh.id()) else { continue };
+        match copy_mesh(mesh) {
+            Ok(copy) => *rest = RestMesh { copy: Some(Arc::new(copy)), tissue, ..RestMesh::default() },
+            Err(error) => rest.warn(organ, &error.to_string()),
+        }
+    }
+}
+
+/// Publish: gives a binding to the vessels of organs that are followed.
+pub(crate) fn attach_bindings(
+    mut commands: Commands,
+    organs: Query<&OrganVessels, Deforming>,
+    unbound: Query<(), (With<Vessels>, Without<VesselBinding>)>,
+) {
+    for &vessels in organs.iter().flat_map(|vessels| vessels.entities()).filter(|&&entity| unbound.contains(entity)) {
+        commands.entity(vessels).try_insert(VesselBinding::default());
+    }
+}
+
+/// An organ whose mesh is followed.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct FollowedMesh {
+    entity: Entity,
+    mesh: &'static Mesh3d,
+    progress: Option<&'static GrowthProgress>,
+    vessels: &'static OrganVessels,
+    rest: &'static mut RestMesh,
+}
+
+/// Publish: vessels go where their organ's mesh is.
+pub(crate) fn follow_meshes(
+    meshes: Option<Res<Assets<Mesh>>>,
+    mut organs: Query<FollowedMesh, (With<FollowsMesh>, Without<FollowsTetrahedra>)>,
+    mut bound: Query<Bound>,
+) {
+    let Some(meshes) = meshes else { return };
+    for mut organ in &mut organs {
+        let (Some(mesh), Some(copy)) = (meshes.get(organ.mesh.id()), organ.rest.copy.clone()) else { continue };
+        let Some(vertices) = vertex_positions(mesh) else {
+            organ.rest.warn(organ.entity, "its mesh's positions are not in main memory as three floats each");
+            continue;
+        };
+        if vertices.len() != copy.positions.len() {
+            // The tissue of a mesh that is another one is being prepared; vessels that did not grow have none.
+            if organ.progress.is_none() {
+                organ.rest.warn(organ.entity, "its mesh has another number of vertices than it had at rest");
+            }
+            continue;
+        }
+        let has_moved = organ.rest.bypass_change_detection().take_vertices(vertices);
+        let is_at_rest = organ.rest.followed == copy.positions;
+        let motion = Motion {
+            rest: RestOrgan::Surface(copy),
+            lineage: organ.rest.tissue,
+            is_grown: organ.progress.is_none_or(GrowthProgress::is_finished),
+            has_moved,
+            vertices: if is_at_rest { None } else { Some(&organ.rest.followed) },
+        };
+        if let Err(error) = motion.carry_along(organ.vessels.entities(), &mut bound) {
+            organ.rest.bypass_change_detection().warn(organ.entity, &error.to_string());
+        }
+    }
+}
+
+/// An organ whose tetrahedra are followed.
+#[derive(QueryData)]
+#[query_data(mutable)]
+pub(crate) struct FollowedTetrahedra {
+    entity: Entity,
+    tetrahedra: Ref<'static, FollowsTetrahedra>,
+    progress: Option<&'static GrowthProgress>,
+    vessels: &'static OrganVessels,
+    rest: &'static mut RestMesh,
+}
+
+/// Publish: vessels go where their organ's tetrahedra are.
+pub(crate) fn follow_tetrahedra(mut organs: Query<FollowedTetrahedra>, mut bound: Query<Bound>) {
+    for mut organ in &mut organs {
+        let tetrahedra = &organ.tetrahedra;
+        let is_at_rest = tetrahedra.positions == tetrahedra.rest.positions();
+        let motion = Motion {
+            rest: RestOrgan::Solid(Arc::clone(&tetrahedra.rest)),
+            lineage: tetrahedra.lineage,
+            is_grown: organ.progress.is_none_or(GrowthProgress::is_finished),
+            has_moved: tetrahedra.is_changed(),
+            vertices: if is_at_rest { None } else { Some(&tetrahedra.positions) },
+        };
+        if let Err(error) = motion.carry_along(organ.vessels.entities(), &mut bound) {
+            organ.rest.bypass_change_detection().warn(organ.entity, &error.to_string());
+        }
+    }
+}
+
+/// Vessels that no longer follow come to rest, unless there is another way in which they follow.
+pub(crate) fn release_vessels<Followed: Component, Other: Component>(
+    removed: On<Remove, Followed>,
+    organs: Query<(Option<&OrganVessels>, Has<Other>)>,
+    mut vessels: Query<Bound>,
+    mut commands: Commands,
+) {
+    let Ok((entities, follows_otherwise)) = organs.get(removed.entity) else { return };
+    let entities = entities.map_or(&[][..], OrganVessels::entities);
+    let mut each = vessels.iter_many_mut(entities);
+    while let Some(mut bound) = each.fetch_next() {
+        bound.come_to_rest();
+    }
+    for &entity in entities {
+        commands.entity(entity).try_remove::<VesselBinding>();
+    }
+    if !follows_otherwise {
+        commands.entity(removed.entity).queue_silenced(|mut organ: EntityWorldMut| {
+            organ.remove::<RestMesh>();
+        });
+    }
+}

@@ -1,0 +1,57 @@
+//! Deformation: vessels follow an organ that changes its shape.
+
+use crate::plugin::{
+    growth::source,
+    order::{self, VesselSystems},
+    vessels::VesselsPlugin,
+};
+use bevy::{
+    app::{App, Plugin, Update},
+    ecs::{
+        intern::Interned,
+        schedule::{IntoScheduleConfigs, ScheduleLabel},
+    },
+};
+
+mod bound;
+pub(crate) mod follow;
+
+pub use follow::{FollowsMesh, FollowsTetrahedra};
+
+/// Lets vessels follow organs with [`FollowsMesh`] or [`FollowsTetrahedra`].
+#[derive(Clone, Debug)]
+pub struct DeformationPlugin {
+    schedule: Interned<dyn ScheduleLabel>,
+}
+
+impl DeformationPlugin {
+    /// Runs in another schedule than `Update`.
+    #[must_use]
+    pub fn in_schedule(schedule: impl ScheduleLabel) -> Self {
+        Self { schedule: schedule.intern() }
+    }
+}
+
+impl Default for DeformationPlugin {
+    fn default() -> Self {
+        Self::in_schedule(Update)
+    }
+}
+
+impl Plugin for DeformationPlugin {
+    fn build(&self, app: &mut App) {
+        VesselsPlugin::ensure(app, self.schedule);
+        order::configure(app, self.schedule);
+        app.add_observer(follow::release_vessels::<FollowsMesh, FollowsTetrahedra>)
+            .add_observer(follow::release_vessels::<FollowsTetrahedra, FollowsMesh>);
+        let follow = (follow::attach_bindings, (follow::follow_meshes, follow::follow_tetrahedra).chain());
+        app.add_systems(
+            self.schedule,
+            (
+                // An organ is at rest as it is when its tissue is prepared.
+                follow::take_rest.in_set(VesselSystems::Source).after(source::begin),
+                follow.chain().in_set(VesselSystems::Follow),
+            ),
+        );
+    }
+}

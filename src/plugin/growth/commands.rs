@@ -1,0 +1,82 @@
+//! Growing an organ in one call, without waiting for frames.
+
+use crate::plugin::growth::{
+    grow::{is_done, run_to_end},
+    messages::GrowthFinished,
+    progress::GrowthPhase,
+    publish::publish_vessels,
+    source::{Organ, OrganMeshes, StartMessages},
+    state::Need,
+};
+use bevy::{
+    ecs::{
+        entity::Entity,
+        message::MessageWriter,
+        system::{EntityCommands, In, Query, RegisteredSystemError},
+        world::{EntityWorldMut, World},
+    },
+    log::warn,
+};
+
+/// Commands for organs.
+pub trait EntityCommandsExt {
+    /// Grows the organ's vessels to their end at once, when the command is applied: prepares the tissue and does all
+    /// steps, however long that takes, paused or not. The vessels are the same as those grown over many frames.
+    ///
+    /// Where the mesh isn't loaded yet, they grow in the frame in which its tissue is ready.
+    ///
+    /// ```
+    /// # use bevy_vessels::{plugin::{EntityCommandsExt, Vasculature}, synthesis::preset::PresetName};
+    /// # use bevy::prelude::{Assets, Commands, Mesh, Mesh3d, ResMut, Sphere};
+    /// fn setup(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>) {
+    ///     let organ = Mesh3d(meshes.add(Sphere::new(1.0)));
+    ///     commands.spawn((organ, Vasculature::new(PresetName::Paper))).grow_now();
+    /// }
+    /// # bevy::ecs::system::assert_is_system(setup);
+    /// ```
+    fn grow_now(&mut self) -> &mut Self;
+}
+
+impl EntityCommandsExt for EntityCommands<'_> {
+    fn grow_now(&mut self) -> &mut Self {
+        self.queue(|organ: EntityWorldMut| {
+            let entity = organ.id();
+            if let Err(error) = grow_organ_now(organ.into_world_mut(), entity) {
+                warn!("{entity}: grow_now needs the GrowthPlugin and mesh assets: {error}");
+            }
+        })
+    }
+}
+
+fn grow_organ_now(world: &mut World, organ: Entity) -> Result<(), RegisteredSystemError<In<Entity>>> {
+    world.run_system_cached_with(finish_organ, organ)?;
+    if let Err(error) = world.run_system_cached(publish_vessels) {
+        warn!("{organ}: the vessels are published at the next frame: {error}");
+    }
+    Ok(())
+}
+
+/// Prepares an organ here and now, and does all its steps.
+fn finish_organ(
+    In(entity): In<Entity>,
+    meshes: OrganMeshes,
+    mut organs: Query<Organ>,
+    mut messages: StartMessages,
+    mut finished: MessageWriter<GrowthFinished>,
+) {
+    let Ok(mut organ) = organs.get_mut(entity) else {
+        warn!("{entity}: grow_now is for entities with a Vasculature");
+        return;
+    };
+    organ.follow();
+    organ.state.hasten();
+    if organ.state.need != Need::Nothing {
+        let outcome = organ.begin(&meshes, |_, prepare| Some(prepare()));
+        organ.report(outcome, &mut messages);
+    }
+    run_to_end(&mut organ.state, &mut organ.progress);
+    if organ.progress.phase == GrowthPhase::Growing && is_done(&organ.state) {
+        organ.progress.phase = GrowthPhase::Finished;
+        finished.write(GrowthFinished { organ: entity });
+    }
+}

@@ -1,0 +1,109 @@
+//! Grow: steps of all organs, one each in turn, until the frame's budget is used up.
+//!
+//! The budget limits how many steps a frame does, never what a step does: the same seed gives the same vessels at any
+//! frame rate. A step can't be divided, so what the next one will cost is foretold from the organ's last ones, publishing
+//! included, and it is left to the next frame where it would overrun. The organ whose step was left is the first to have
+//! its turn then: whoever takes part does as many steps as the others, give or take one.
+
+use crate::plugin::growth::budget::{GrowthBudget, GrowthFrame, begin_after, share_out};
+use crate::plugin::growth::{
+    messages::GrowthFinished,
+    progress::{GrowthControl, GrowthPhase, GrowthProgress},
+    state::GrowthState,
+};
+use bevy::{
+    ecs::{
+        change_detection::{Res, ResMut},
+        entity::Entity,
+        message::MessageWriter,
+        system::{Local, Query},
+    },
+    platform::time::Instant,
+};
+
+/// Does as many steps as the budget allows.
+pub(crate) fn grow(
+    budget: Res<GrowthBudget>,
+    mut frame: ResMut<GrowthFrame>,
+    mut last: Local<Option<Entity>>,
+    mut organs: Query<(Entity, &GrowthControl, &mut GrowthState, &mut GrowthProgress)>,
+) {
+    let start = Instant::now();
+    let mut steps = 0;
+    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.finish) {
+        steps += run_to_end(&mut state, &mut progress);
+    }
+    let waiting = organs.iter().filter(|(_, control, state, _)| state.may_step(**control));
+    let mut round: Vec<_> = waiting.map(|(organ, _, state, _)| (organ, state.expected_cost())).collect();
+    round.sort_unstable_by_key(|&(organ, _)| organ);
+    begin_after(&mut round, *last);
+    let started = frame.start_time;
+    steps += share_out(
+        *budget,
+        round,
+        || started + start.elapsed(),
+        |organ| {
+            *last = Some(organ);
+            let (_, control, mut state, mut progress) = organs.get_mut(organ).ok()?;
+            step(&mut state, &mut progress);
+            state.may_step(*control).then(|| state.expected_cost())
+        },
+    );
+    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.is_unsettled()) {
+        settle(&mut state, &mut progress);
+    }
+    frame.steps += steps;
+    frame.step_time += start.elapsed();
+}
+
+/// Says which growths have done all their steps.
+pub(crate) fn end_growths(
+    mut organs: Query<(Entity, &GrowthState, &mut GrowthProgress)>,
+    mut finished: MessageWriter<GrowthFinished>,
+) {
+    for (organ, state, mut progress) in &mut organs {
+        if progress.phase == GrowthPhase::Growing && is_done(state) {
+            progress.phase = GrowthPhase::Finished;
+            finished.write(GrowthFinished { organ });
+        }
+    }
+}
+
+/// Does one step of an organ.
+fn step(state: &mut GrowthState, progress: &mut GrowthProgress) {
+    let start = Instant::now();
+    state.step();
+    let cost = start.elapsed();
+    state.note_step(cost);
+    let grow_time = progress.grow_time + cost;
+    *progress = GrowthProgress::of(GrowthPhase::Growing, state.growth(), grow_time);
+}
+
+/// Brings an organ's radii up to date with its steps.
+fn settle(state: &mut GrowthState, progress: &mut GrowthProgress) {
+    let start = Instant::now();
+    state.settle();
+    let cost = start.elapsed();
+    state.note_settling(cost);
+    progress.grow_time += cost;
+}
+
+/// Does all remaining steps of an organ that has its tissue, and says how many they were.
+pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
+    if state.growth().is_none() || is_done(state) {
+        // Without a tissue the wish stays; at the end there is nothing left to wish for.
+        state.finish &= !is_done(state);
+        return 0;
+    }
+    let start = Instant::now();
+    let before = progress.step;
+    state.run();
+    let grow_time = progress.grow_time + start.elapsed();
+    *progress = GrowthProgress::of(GrowthPhase::Growing, state.growth(), grow_time);
+    progress.step - before
+}
+
+/// Whether there is a growth, and it has done all its steps.
+pub(crate) fn is_done(state: &GrowthState) -> bool {
+    state.growth().is_some_and(|growth| growth.is_finished())
+}

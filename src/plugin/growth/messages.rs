@@ -1,0 +1,83 @@
+//! What is said to a growth, and what it answers.
+
+use crate::plugin::organ::mesh::OrganMeshError;
+use crate::synthesis::{generator::GeneratorError, tissue::TissueError};
+use bevy::ecs::{entity::Entity, message::Message};
+
+/// Tells an organ's growth what to do. Obeyed in the same frame or the next; unknown organs are passed over.
+///
+/// ```
+/// # use bevy_vessels::plugin::{GrowthAction, GrowthCommand, Vasculature};
+/// # use bevy::prelude::{Entity, MessageWriter, Query, With};
+/// fn step_once(organs: Query<Entity, With<Vasculature>>, mut commands: MessageWriter<GrowthCommand>) {
+///     commands.write_batch(organs.iter().map(|organ| GrowthCommand::new(organ, GrowthAction::Step(1))));
+/// }
+/// # bevy::ecs::system::assert_is_system(step_once);
+/// ```
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GrowthCommand {
+    /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
+    pub organ: Entity,
+    /// What it is to do.
+    pub action: GrowthAction,
+}
+
+impl GrowthCommand {
+    /// A command for one organ.
+    pub fn new(organ: Entity, action: GrowthAction) -> Self {
+        Self { organ, action }
+    }
+}
+
+/// What a growth can be told to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GrowthAction {
+    /// Do no more steps by itself.
+    Pause,
+    /// Go on by itself.
+    Resume,
+    /// Pause, but do this many steps more than have been asked for, as the budget allows.
+    Step(u32),
+    /// Start again from the roots. A growth that failed tries once more. A paused one starts and stays paused.
+    Restart,
+    /// Do all remaining steps at once, in one frame, however long it takes, paused or not. If the mesh or the tissue
+    /// isn't ready, that is the first frame in which they are.
+    Finish,
+}
+
+/// An organ's growth starts from its roots, for the first time or again.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GrowthStarted {
+    /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
+    pub organ: Entity,
+}
+
+/// An organ's vessels have done all their steps.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GrowthFinished {
+    /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
+    pub organ: Entity,
+}
+
+/// An organ's growth could not start. Other organs are not affected; a change of what was wrong starts it.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct GrowthFailed {
+    /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
+    pub organ: Entity,
+    /// What was wrong, with the value and the remedy.
+    pub error: OrganGrowthError,
+}
+
+/// Why an organ's vessels do not grow.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OrganGrowthError {
+    /// Its mesh is not one that vessels can grow on.
+    #[error(transparent)]
+    Mesh(#[from] OrganMeshError),
+    /// Its mesh gives no tissue of the kind that is asked for.
+    #[error(transparent)]
+    Tissue(#[from] TissueError),
+    /// Its settings or roots are no start for a growth.
+    #[error(transparent)]
+    Generator(#[from] GeneratorError),
+}

@@ -1,0 +1,99 @@
+//! Growth: from an organ's mesh and settings to its vessels, some steps in each frame.
+
+use crate::plugin::{
+    order::{self, VesselSystems},
+    vessels::VesselsPlugin,
+};
+use bevy::{
+    app::{App, Plugin, Update},
+    asset::Assets,
+    ecs::{
+        intern::Interned,
+        schedule::{IntoScheduleConfigs, ScheduleLabel},
+    },
+    log::warn,
+    mesh::Mesh,
+};
+
+pub(crate) mod budget;
+pub(crate) mod commands;
+pub mod diagnostics;
+pub(crate) mod grow;
+pub(crate) mod messages;
+pub(crate) mod progress;
+pub(crate) mod publish;
+pub(crate) mod source;
+pub(crate) mod state;
+pub(crate) mod vasculature;
+
+pub use budget::{GrowthBudget, GrowthFrame};
+pub use commands::EntityCommandsExt;
+pub use messages::{GrowthAction, GrowthCommand, GrowthFailed, GrowthFinished, GrowthStarted, OrganGrowthError};
+pub use progress::{GrowthControl, GrowthPhase, GrowthProgress};
+pub use state::GrowthState;
+pub use vasculature::Vasculature;
+
+/// Grows vessels on every entity with a [`Vasculature`]. Needs no window and no renderer, only mesh assets:
+/// `DefaultPlugins`, or `AssetPlugin` and `MeshPlugin`.
+///
+/// [`VesselPlugin`](crate::VesselPlugin) adds this, and all else that can be done with vessels.
+#[derive(Clone, Debug)]
+pub struct GrowthPlugin {
+    schedule: Interned<dyn ScheduleLabel>,
+    budget: GrowthBudget,
+}
+
+impl GrowthPlugin {
+    /// Runs in another schedule than `Update`.
+    #[must_use]
+    pub fn in_schedule(mut self, schedule: impl ScheduleLabel) -> Self {
+        self.schedule = schedule.intern();
+        self
+    }
+
+    /// Starts with another budget than [`GrowthBudget::default`]. It is a resource, and may be changed later.
+    #[must_use]
+    pub fn with_budget(mut self, budget: GrowthBudget) -> Self {
+        self.budget = budget;
+        self
+    }
+}
+
+impl Default for GrowthPlugin {
+    fn default() -> Self {
+        Self { schedule: Update.intern(), budget: GrowthBudget::default() }
+    }
+}
+
+impl Plugin for GrowthPlugin {
+    fn build(&self, app: &mut App) {
+        VesselsPlugin::ensure(app, self.schedule);
+        order::configure(app, self.schedule);
+        app.insert_resource(self.budget)
+            .init_resource::<GrowthFrame>()
+            .add_message::<GrowthCommand>()
+            .add_message::<GrowthStarted>()
+            .add_message::<GrowthFinished>()
+            .add_message::<GrowthFailed>()
+            .add_observer(publish::remove_vessels);
+        diagnostics::register(app);
+        let source = (source::obey_commands, source::notice_changes, source::begin, source::receive_tissues);
+        let grow = (grow::grow, grow::end_growths);
+        let publish = (publish::publish_vessels, diagnostics::measure);
+        app.add_systems(
+            self.schedule,
+            (
+                budget::begin_frame.before(VesselSystems::Source),
+                source.chain().in_set(VesselSystems::Source),
+                grow.chain().in_set(VesselSystems::Grow),
+                publish.chain().in_set(VesselSystems::Publish),
+            ),
+        );
+    }
+
+    fn finish(&self, app: &mut App) {
+        if !app.world().contains_resource::<Assets<Mesh>>() {
+            warn!("no vessels will grow: there are no mesh assets; add DefaultPlugins, or AssetPlugin and MeshPlugin");
+        }
+    }
+}

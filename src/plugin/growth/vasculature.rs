@@ -1,0 +1,107 @@
+//! What a user wishes for: vessels on an organ.
+//!
+//! An organ is an entity with a mesh and a [`Vasculature`]. Everything else is added by the plugin. Each kind of vessels that
+//! has roots gets one vessel entity, a child of the organ, that carries a whole tree in
+//! [`Vessels`](crate::plugin::Vessels).
+
+use crate::plugin::{
+    growth::{
+        progress::{GrowthControl, GrowthProgress},
+        state::GrowthState,
+    },
+    vessels::appearance::VesselAppearance,
+};
+use crate::synthesis::{
+    generator::Generator,
+    preset::{Preset, PresetName},
+    roots::RootPlacements,
+    tissue::TissueSettings,
+};
+use bevy::{
+    camera::visibility::Visibility,
+    ecs::{component::Component, reflect::ReflectComponent},
+    reflect::{Reflect, std_traits::ReflectDefault},
+    transform::components::Transform,
+};
+
+/// Vessels that an organ is to have: put it beside the organ's `Mesh3d`, and they grow.
+///
+/// Changing any field of it starts the growth again at the next frame. What is slow, preparing the tissue, is done again
+/// only where [`tissue`](Self::tissue) or the mesh changed. Removing it removes the vessels.
+///
+/// All lengths are in the local space of the mesh, with [`fit`](Self::fit) off; with `fit` on, they are shares of the
+/// organ's size.
+///
+/// ```
+/// # use bevy_vessels::{plugin::Vasculature, synthesis::preset::PresetName};
+/// let vasculature = Vasculature::new(PresetName::Colon).with_seed(7);
+/// ```
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+#[require(GrowthState, GrowthProgress, GrowthControl, VesselAppearance, Transform, Visibility)]
+pub struct Vasculature {
+    /// Chooses one of the countless networks that the same settings give. The same seed gives the same network, on any
+    /// machine and at any frame rate.
+    ///
+    /// Default: 0.
+    pub seed: u64,
+    /// What makes the vessels, with its settings. Default: that of [`PresetName::Paper`].
+    pub generator: Generator,
+    /// Where vessels enter the organ, in the local space of its mesh.
+    pub roots: RootPlacements,
+    /// Which part of the organ is to be supplied: its surface, its inside or both.
+    pub tissue: TissueSettings,
+    /// Whether the lengths of the [`generator`](Self::generator) are made for a tissue of equivalent diameter 1, as those of
+    /// all presets are, and are to be fitted to this organ ([`Generator::fit`]).
+    ///
+    /// Off, they are taken as lengths in the mesh's local space. Default: true.
+    pub fit: bool,
+}
+
+impl Vasculature {
+    /// The vessels of a named preset, with seed 0, fitted to the organ.
+    pub fn new(preset: PresetName) -> Self {
+        Self::from_preset(preset.load())
+    }
+
+    /// The vessels of a preset, such as one read from a file, with seed 0, fitted to the organ.
+    pub fn from_preset(preset: Preset) -> Self {
+        let Preset { version: _, source: _, fit, tissue, roots, generator } = preset;
+        Self { seed: 0, generator, roots, tissue, fit }
+    }
+
+    /// Chooses another network.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// Grows by another generator or other settings, with the same tissue and roots.
+    #[must_use]
+    pub fn with_generator(mut self, generator: impl Into<Generator>) -> Self {
+        self.generator = generator.into();
+        self
+    }
+
+    /// Puts the roots elsewhere.
+    #[must_use]
+    pub fn with_roots(mut self, roots: RootPlacements) -> Self {
+        self.roots = roots;
+        self
+    }
+}
+
+/// The preset that makes these vessels, whatever the seed: for a file.
+impl From<&Vasculature> for Preset {
+    fn from(vasculature: &Vasculature) -> Self {
+        let Vasculature { seed: _, generator, roots, tissue, fit } = vasculature.clone();
+        Self { version: Self::VERSION, source: String::new(), fit, tissue, roots, generator }
+    }
+}
+
+impl Default for Vasculature {
+    fn default() -> Self {
+        Self::new(PresetName::Paper)
+    }
+}

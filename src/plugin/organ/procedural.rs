@@ -1,0 +1,33 @@
+//! Procedural organs as Bevy meshes.
+
+use crate::synthesis::mesh::ShadedMesh;
+use bevy::{
+    asset::RenderAssetUsages,
+    mesh::{Indices, Mesh, PrimitiveTopology},
+};
+
+/// A triangle list with positions, normals, UVs and vertex colours, kept in both worlds so that vessels can grow on it.
+impl From<ShadedMesh> for Mesh {
+    fn from(organ: ShadedMesh) -> Self {
+        Self::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+            .with_inserted_attribute(Self::ATTRIBUTE_POSITION, organ.positions)
+            .with_inserted_attribute(Self::ATTRIBUTE_NORMAL, organ.normals)
+            .with_inserted_attribute(Self::ATTRIBUTE_UV_0, organ.uvs)
+            .with_inserted_attribute(Self::ATTRIBUTE_COLOR, organ.colors)
+            .with_inserted_indices(Indices::U32(organ.triangles.into_iter().flatten().collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::plugin::organ::procedural::*;
+    use crate::{plugin::triangle_mesh, synthesis::organ::LiverSettings};
+
+    #[test]
+    fn an_organ_keeps_its_triangles_on_the_way_through_bevy() {
+        let organ = LiverSettings { subdivisions: 2, ..Default::default() }.generate().expect("within limits").mesh;
+        let read = triangle_mesh(&Mesh::from(organ.clone())).expect("an organ's mesh is readable");
+        assert_eq!(read.positions(), organ.positions);
+        assert_eq!(read.triangles(), organ.triangles);
+    }
+}

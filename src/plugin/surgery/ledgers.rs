@@ -1,0 +1,112 @@
+//! What makes an organ's vessels cuttable, and the ledger of what was done to them.
+//!
+//! In: [`Cuttable`] on an organ. Out: [`VesselWounds`] on each of its vessel entities, which a regrowth clears.
+
+use crate::plugin::vessels::wounds::VesselWounds;
+use crate::plugin::{
+    surgery::{
+        cuttable_vessels::CuttableVessels,
+        open_ends::{OpenEndEntities, despawn_children},
+    },
+    vessels::{change_log::SegmentChanges, index::VesselIndex, relations::OrganVessels, tree::Vessels},
+};
+use crate::synthesis::wound::Retraction;
+use bevy::{
+    ecs::{
+        change_detection::{DetectChangesMut, ResMut},
+        component::Component,
+        entity::Entity,
+        lifecycle::Remove,
+        observer::On,
+        query::{Changed, Or, With, Without},
+        reflect::ReflectComponent,
+        system::{Commands, Query},
+        world::EntityWorldMut,
+    },
+    log::warn,
+    reflect::{Reflect, std_traits::ReflectDefault},
+};
+
+/// Lets an organ's vessels be cut, clamped and cauterised: put it beside the organ's
+/// [`Vasculature`](crate::plugin::Vasculature), or on an organ with vessels of your own.
+///
+/// An organ without it pays nothing for it. Add a [`Perfusion`](crate::plugin::Perfusion), too, and open vessels bleed.
+/// Removing it makes the vessels whole again.
+///
+/// ```
+/// # use bevy_vessels::{plugin::{Cuttable, Vasculature}, synthesis::preset::PresetName};
+/// let organ = (Vasculature::new(PresetName::Colon), Cuttable::default());
+/// ```
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct Cuttable {
+    /// How far the ends of later cuts draw back, so that a gap is seen.
+    pub retraction: Retraction,
+}
+
+/// Cut: gives a ledger to the vessels of cuttable organs, and makes all ledgers those of the present vessels.
+pub(crate) fn attach_wounds(
+    mut commands: Commands,
+    organs: Query<&OrganVessels, With<Cuttable>>,
+    bare: Query<(), (With<Vessels>, Without<VesselWounds>)>,
+) {
+    for entity in organs.iter().flat_map(|vessels| vessels.entities()).filter(|&&entity| bare.contains(entity)) {
+        commands.entity(*entity).insert((VesselWounds::default(), VesselIndex::default(), OpenEndEntities::default()));
+    }
+}
+
+/// Cut: vessels that grew anew have no wounds.
+pub(crate) fn clear_outdated(
+    mut vessels: Query<(Entity, &Vessels, &mut VesselWounds)>,
+    mut door: ResMut<CuttableVessels>,
+) {
+    for (entity, vessels, mut wounds) in &mut vessels {
+        if !wounds.is_of(vessels) {
+            door.bypass_change_detection().forget(entity);
+            if wounds.is_empty() {
+                wounds.bypass_change_detection().begin_anew(vessels);
+            } else {
+                wounds.begin_anew(vessels);
+            }
+        }
+    }
+}
+
+/// Cut: ledgers follow changed settings.
+pub(crate) fn follow_settings(
+    organs: Query<(Entity, &Cuttable, &OrganVessels), Or<(Changed<Cuttable>, Changed<OrganVessels>)>>,
+    mut wounds: Query<&mut VesselWounds>,
+) {
+    for (organ, cuttable, vessels) in &organs {
+        let mut wounds = wounds.iter_many_mut(vessels.entities());
+        while let Some(mut wounds) = wounds.fetch_next() {
+            let ledger = wounds.bypass_change_detection().ledger_mut();
+            if let Err(error) = ledger.set_retraction(cuttable.retraction) {
+                warn!("{organ}: ends go on drawing back as before: {error}");
+                break;
+            }
+        }
+    }
+}
+
+/// Vessels that are no longer cuttable are whole.
+pub(crate) fn remove_wounds(
+    removed: On<Remove, Cuttable>,
+    organs: Query<&OrganVessels>,
+    mut vessels: Query<(&OpenEndEntities, &mut SegmentChanges)>,
+    mut commands: Commands,
+) {
+    let Ok(entities) = organs.get(removed.entity) else { return };
+    for &entity in entities.entities() {
+        let Ok((ends, mut changes)) = vessels.get_mut(entity) else { continue };
+        let closed = ends.iter().map(|(_, end)| end).collect();
+        commands.entity(entity).queue_silenced(|vessels: EntityWorldMut| despawn_children(vessels, closed));
+        changes.mark_all();
+        commands.entity(entity).try_remove::<(VesselWounds, VesselIndex, OpenEndEntities)>();
+    }
+}
+
+/// A ledger that is gone can't undo anything.
+pub(crate) fn forget_ledger(removed: On<Remove, VesselWounds>, mut door: ResMut<CuttableVessels>) {
+    door.forget(removed.entity);
+}

@@ -1,0 +1,215 @@
+//! What can be done to vessels, as messages, and what came of it.
+
+use crate::synthesis::{
+    tree::{Place, VesselKind},
+    wound::{Blade, BladeError, ClampId, WoundError, WoundReport},
+};
+use bevy::{
+    ecs::{entity::Entity, message::Message},
+    math::Vec3,
+};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Asks for something to be done to vessels: the same as [`CuttableVessels`](crate::plugin::CuttableVessels), as a
+/// message. Carried out in the same frame or the next.
+///
+/// ```
+/// # use bevy_vessels::{plugin::{VesselAction, VesselCommand, VesselSite}};
+/// # use bevy::prelude::{MessageWriter, Vec3};
+/// fn clamp_here(mut commands: MessageWriter<VesselCommand>) {
+///     let site = VesselSite::Near { point: Vec3::new(0.1, 0.2, 0.0), reach: 0.01 };
+///     commands.write(VesselCommand::new(VesselAction::Clamp(site)));
+/// }
+/// # bevy::ecs::system::assert_is_system(clamp_here);
+/// ```
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct VesselCommand {
+    /// The organ that it is meant for; `None` for all that it meets.
+    pub organ: Option<Entity>,
+    /// The stroke that it is part of; `None` for an action by itself.
+    pub stroke: Option<StrokeId>,
+    /// What is to be done.
+    pub action: VesselAction,
+}
+
+impl VesselCommand {
+    /// A command for all organs with a [`Cuttable`](crate::plugin::Cuttable).
+    pub fn new(action: VesselAction) -> Self {
+        Self { organ: None, stroke: None, action }
+    }
+
+    /// The same for one organ.
+    #[must_use]
+    pub fn on(self, organ: Entity) -> Self {
+        Self { organ: Some(organ), ..self }
+    }
+
+    /// The same as part of a stroke.
+    #[must_use]
+    pub fn in_stroke(self, stroke: StrokeId) -> Self {
+        Self { stroke: Some(stroke), ..self }
+    }
+}
+
+/// One movement of an instrument, over as many frames as it takes: what the user takes for one action, and undo takes back
+/// as one.
+///
+/// Begin one when the instrument goes on, and give it to each of the sweeps that follow: by [`VesselCommand::in_stroke`] or
+/// [`CuttableVessels::in_stroke`](crate::plugin::CuttableVessels::in_stroke). It ends when it is used no more. Several may
+/// go on at once, such as those of two hands.
+///
+/// What is done between two actions of a stroke, and to the same vessels, is undone together with it: a stroke that went on
+/// over it can't be taken back from under it. After an undo the stroke may go on, as one that has just begun.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct StrokeId(u64);
+
+impl StrokeId {
+    /// A stroke that nothing belongs to yet.
+    pub fn begin() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+/// What can be done to vessels. Shapes, points and lengths are in world space.
+#[derive(Clone, Debug, PartialEq)]
+pub enum VesselAction {
+    /// Severs every vessel that the blade crosses; a ball or capsule also takes out what lies within it.
+    Cut(Blade),
+    /// Seals by heat all vessels up to a calibre within a ball or capsule, for good.
+    Cauterise {
+        /// The ball or capsule.
+        volume: Blade,
+        /// Largest diameter that is sealed; infinity for any. Limits: > 0.
+        ///
+        /// Measured by the mean scale of the organ, the cube root of its determinant.
+        max_calibre: f32,
+    },
+    /// Puts a clamp on: no blood passes until it is taken off.
+    Clamp(VesselSite),
+    /// Ties off: a clamp that only undo takes off.
+    Ligate(VesselSite),
+    /// Takes a clamp off.
+    Unclamp {
+        /// The vessel entity.
+        vessels: Entity,
+        /// The clamp, from the [`WoundReport`] of when it was put on.
+        clamp: ClampId,
+    },
+    /// Takes off the clamp that is nearest to a point.
+    UnclampNear {
+        /// The point.
+        point: Vec3,
+        /// How far from it a clamp may be.
+        reach: f32,
+    },
+    /// Undoes the last action or stroke that changed anything, wherever it did; for one organ, the last that changed that,
+    /// there.
+    Undo,
+    /// Undoes all actions.
+    UndoAll,
+}
+
+/// Where on the vessels something is to be done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VesselSite {
+    /// On the vessel that is nearest to a point, measured to its wall.
+    Near {
+        /// The point.
+        point: Vec3,
+        /// How far from it a vessel's wall may be.
+        reach: f32,
+    },
+    /// At a place of a vessel entity.
+    At {
+        /// The vessel entity.
+        vessels: Entity,
+        /// The place.
+        place: Place,
+    },
+}
+
+/// What kind of action it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum OperationKind {
+    /// Vessels were severed.
+    Cut,
+    /// Vessels were sealed by heat.
+    Cauterised,
+    /// A clamp was put on.
+    Clamped,
+    /// A vessel was tied off.
+    Ligated,
+    /// A clamp was taken off.
+    Unclamped,
+    /// An action, a stroke or everything was undone.
+    Undone,
+}
+
+/// Something was done to the vessels of one vessel entity. An action that changes several, in several organs or in arteries
+/// and veins, gives one of these for each.
+///
+/// Entities for the ends that it opened are there from the same frame on: see
+/// [`OpenEndEntities`](crate::plugin::OpenEndEntities).
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct VesselOperation {
+    /// The organ.
+    pub organ: Entity,
+    /// The vessel entity.
+    pub vessels: Entity,
+    /// What kind of vessels these are.
+    pub kind: VesselKind,
+    /// What was done.
+    pub operation: OperationKind,
+    /// The stroke that it was part of. `None` for an undo.
+    pub stroke: Option<StrokeId>,
+    /// What it changed; positions in the space of the organ's mesh. Never empty.
+    pub report: WoundReport,
+}
+
+/// An action could not be done, and changed nothing. A cut that meets no vessel is none of these.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct VesselOperationFailed {
+    /// What was asked for.
+    pub command: VesselCommand,
+    /// Why it could not be done.
+    pub error: OperationError,
+}
+
+/// Why an action could not be done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OperationError {
+    /// The ledger turned it down.
+    #[error(transparent)]
+    Wound(#[from] WoundError),
+    /// The blade cannot be brought into an organ's space.
+    #[error("{organ}: {error}")]
+    Blade {
+        /// The organ.
+        organ: Entity,
+        /// What is wrong.
+        error: BladeError,
+    },
+    /// There is no vessel, or no clamp, at the point.
+    #[error("there is no {what} within {reach} of {point}; aim nearer or give a longer reach")]
+    NothingNear {
+        /// What was looked for.
+        what: &'static str,
+        /// Where.
+        point: Vec3,
+        /// How far from there.
+        reach: f32,
+    },
+    /// The entity is not an organ whose vessels can be cut.
+    #[error("{organ} is no organ that can be cut; give it a Cuttable, and wait until its vessels have begun to grow")]
+    NotCuttable {
+        /// The entity.
+        organ: Entity,
+    },
+    /// The entity carries no vessels that can be cut.
+    #[error("{vessels} carries no vessels that can be cut; name a vessel entity of an organ with a Cuttable")]
+    NoVessels {
+        /// The entity.
+        vessels: Entity,
+    },
+}

@@ -1,0 +1,70 @@
+//! Surgery: vessels are cut, clamped, tied and sealed, and healed again.
+
+use crate::plugin::{
+    order::{self, VesselSystems},
+    vessels::VesselsPlugin,
+};
+use bevy::{
+    app::{App, Plugin, Update},
+    ecs::{
+        intern::Interned,
+        schedule::{IntoScheduleConfigs, ScheduleLabel},
+    },
+};
+
+pub(crate) mod cuttable_vessels;
+pub(crate) mod ledgers;
+pub(crate) mod messages;
+pub(crate) mod open_ends;
+mod operate;
+mod undo;
+
+pub use cuttable_vessels::{CuttableVessels, Stroke};
+pub use ledgers::Cuttable;
+pub use messages::{
+    OperationError, OperationKind, StrokeId, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed,
+    VesselSite,
+};
+pub use open_ends::{OpenEnd, OpenEndEntities};
+
+/// Lets the vessels of organs with a [`Cuttable`] be cut, through [`CuttableVessels`] or [`VesselCommand`]s.
+#[derive(Clone, Debug)]
+pub struct SurgeryPlugin {
+    schedule: Interned<dyn ScheduleLabel>,
+}
+
+impl SurgeryPlugin {
+    /// Runs in another schedule than `Update`.
+    #[must_use]
+    pub fn in_schedule(schedule: impl ScheduleLabel) -> Self {
+        Self { schedule: schedule.intern() }
+    }
+}
+
+impl Default for SurgeryPlugin {
+    fn default() -> Self {
+        Self::in_schedule(Update)
+    }
+}
+
+impl Plugin for SurgeryPlugin {
+    fn build(&self, app: &mut App) {
+        VesselsPlugin::ensure(app, self.schedule);
+        order::configure(app, self.schedule);
+        app.init_resource::<CuttableVessels>()
+            .add_message::<VesselCommand>()
+            .add_message::<VesselOperation>()
+            .add_message::<VesselOperationFailed>()
+            .add_observer(ledgers::remove_wounds)
+            .add_observer(ledgers::forget_ledger);
+        let cut = (
+            ledgers::attach_wounds,
+            ledgers::clear_outdated,
+            ledgers::follow_settings,
+            cuttable_vessels::carry_out,
+            open_ends::spawn_open_ends,
+            open_ends::move_open_ends,
+        );
+        app.add_systems(self.schedule, cut.chain().in_set(VesselSystems::Cut));
+    }
+}

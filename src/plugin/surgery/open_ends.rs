@@ -1,0 +1,204 @@
+//! Open ends of severed vessels as entities: where blood leaves, for particles, sounds and instruments.
+//!
+//! In: the ledgers in [`VesselWounds`]. Out: one entity with an [`OpenEnd`] for each open lumen, child of its vessel
+//! entity, that moves with the tissue and is despawned when the lumen closes.
+
+use crate::plugin::vessels::{relations::VesselsOf, tree::Vessels, wounds::VesselWounds};
+use crate::synthesis::tree::VesselTree;
+use crate::synthesis::{
+    haemodynamics::EndState,
+    tree::{Place, VesselKind},
+    units::{Flow, Pressure, Volume},
+    wound::{EndId, EndSide, SeveredEnd},
+};
+use bevy::{
+    camera::visibility::Visibility,
+    ecs::{
+        component::Component,
+        entity::Entity,
+        hierarchy::{ChildOf, Children},
+        query::{Changed, Or},
+        reflect::ReflectComponent,
+        system::{Commands, Query},
+        world::EntityWorldMut,
+    },
+    math::Vec3,
+    reflect::Reflect,
+    transform::components::Transform,
+};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// An open end of a severed vessel. For reading: the plugin writes it.
+///
+/// The entity's `Transform` is at the end's tip and faces out of the lumen (its forward direction), in the space of the
+/// organ's mesh. Blood leaves it only where the organ has a [`Perfusion`](crate::plugin::Perfusion).
+///
+/// A particle system, on the CPU or the GPU, needs these entities and no more: emit [`flow`](Self::flow) times the frame's
+/// duration at the `GlobalTransform`, with [`velocity`](Self::velocity) along its forward direction. An entity comes with
+/// its end and goes when that is closed; the rest is told by [`BleedingStarted`](crate::plugin::BleedingStarted) and
+/// [`BleedingStopped`](crate::plugin::BleedingStopped).
+///
+/// ```
+/// # use bevy_vessels::plugin::OpenEnd;
+/// # use bevy::prelude::{GlobalTransform, Query, Res, Time, Vec3};
+/// fn emit(time: Res<Time>, ends: Query<(&OpenEnd, &GlobalTransform)>) {
+///     for (end, place) in &ends {
+///         let millilitres = end.flow.ml_per_min() / 60.0 * time.delta_secs_f64();
+///         let (from, speed): (Vec3, Vec3) = (place.translation(), end.velocity as f32 * place.forward());
+/// #       let _ = (millilitres, from, speed);
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(emit);
+/// ```
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Clone, PartialEq)]
+#[require(Transform, Visibility)]
+pub struct OpenEnd {
+    /// The organ.
+    pub organ: Entity,
+    /// The vessel entity.
+    pub vessels: Entity,
+    /// What kind of vessel it is an end of.
+    pub kind: VesselKind,
+    /// What the ledger knows it by.
+    pub id: EndId,
+    /// Where on the tree it is.
+    pub place: Place,
+    /// Which side of the cut it is.
+    pub side: EndSide,
+    /// Position in the space of the organ's mesh.
+    pub position: Vec3,
+    /// Unit vector out of the lumen, in the space of the organ's mesh.
+    pub direction: Vec3,
+    /// Radius of the vessel, in tissue lengths.
+    pub radius: f32,
+    /// Number of bifurcations between the root and here.
+    pub bifurcations: u32,
+    /// What leaves it, as a mean over the last frame.
+    pub flow: Flow,
+    /// Pressure in the vessel before the hole.
+    pub pressure: Pressure,
+    /// Mean velocity in the hole, in m/s: how fast a drop leaves.
+    pub velocity: f64,
+    /// What it has lost since it was opened.
+    pub lost: Volume,
+    /// Whether it bleeds, and if not, why.
+    pub state: EndState,
+}
+
+impl OpenEnd {
+    fn new(organ: Entity, vessels: Entity, kind: VesselKind, end: &SeveredEnd, bifurcations: u32) -> Self {
+        Self {
+            organ,
+            vessels,
+            kind,
+            id: end.id,
+            place: end.place,
+            side: end.side,
+            position: end.position,
+            direction: end.direction,
+            radius: end.radius,
+            bifurcations,
+            flow: Flow::ZERO,
+            pressure: Pressure::ZERO,
+            velocity: 0.0,
+            lost: Volume::ZERO,
+            state: EndState::Dry,
+        }
+    }
+
+    /// Bleeds no more, for want of blood.
+    pub(crate) fn dry(&mut self) {
+        (self.flow, self.pressure, self.velocity) = (Flow::ZERO, Pressure::ZERO, 0.0);
+        self.state = EndState::Dry;
+    }
+
+    /// Where it is and where it faces.
+    fn pose(end: &SeveredEnd) -> Transform {
+        Transform::from_translation(end.position).looking_to(end.direction, end.direction.any_orthogonal_vector())
+    }
+}
+
+/// The entities of the open ends of a vessel entity.
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
+pub struct OpenEndEntities(BTreeMap<EndId, Entity>);
+
+impl OpenEndEntities {
+    /// The entity of an end, while that is open.
+    pub fn get(&self, end: EndId) -> Option<Entity> {
+        self.0.get(&end).copied()
+    }
+
+    /// All ends, in the order in which they were made.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = (EndId, Entity)> + '_ {
+        self.0.iter().map(|(&end, &entity)| (end, entity))
+    }
+}
+
+/// Cut: an entity for each end that is open now, and none for others.
+pub(crate) fn spawn_open_ends(
+    mut commands: Commands,
+    mut vessels: Query<(Entity, &VesselsOf, &Vessels, &VesselWounds, &mut OpenEndEntities), Changed<VesselWounds>>,
+) {
+    for (entity, organ, vessels, wounds, mut entities) in &mut vessels {
+        let mut before = std::mem::take(&mut entities.0);
+        for end in wounds.ends(vessels.tree()).filter(|end| end.is_open) {
+            let spawned = before.remove(&end.id).unwrap_or_else(|| {
+                let bifurcations = bifurcations_above(vessels, end.place);
+                let open_end = OpenEnd::new(organ.0, entity, vessels.kind(), &end, bifurcations);
+                commands.spawn((open_end, OpenEnd::pose(&end), ChildOf(entity))).id()
+            });
+            entities.0.insert(end.id, spawned);
+        }
+        if !before.is_empty() {
+            let closed = before.into_values().collect();
+            commands.entity(entity).queue_silenced(|vessels: EntityWorldMut| despawn_children(vessels, closed));
+        }
+    }
+}
+
+/// Despawns many children at once: one by one, each would be looked for among all of them.
+pub(crate) fn despawn_children(mut parent: EntityWorldMut, unwanted: Vec<Entity>) {
+    let unwanted: BTreeSet<Entity> = unwanted.into_iter().collect();
+    let children = parent.get::<Children>().into_iter().flatten().copied();
+    let (gone, kept): (Vec<Entity>, Vec<Entity>) = children.partition(|child| unwanted.contains(child));
+    parent.replace_related_with_difference::<ChildOf>(&gone, &kept, &[]);
+    let world = parent.into_world_mut();
+    // Those that someone has given another parent, too.
+    for child in unwanted {
+        world.try_despawn(child).ok();
+    }
+}
+
+/// Publish: open ends move with their vessels.
+pub(crate) fn move_open_ends(
+    vessels: Query<(&Vessels, &VesselWounds, &OpenEndEntities), Or<(Changed<Vessels>, Changed<VesselWounds>)>>,
+    mut ends: Query<(&mut OpenEnd, &mut Transform)>,
+) {
+    for (vessels, wounds, entities) in vessels.iter().filter(|(vessels, wounds, _)| wounds.is_of(vessels)) {
+        for (id, entity) in entities.iter() {
+            let (Some(now), Ok((mut end, mut transform))) = (wounds.end(id, vessels.tree()), ends.get_mut(entity))
+            else {
+                continue;
+            };
+            let moved = OpenEnd {
+                place: now.place,
+                position: now.position,
+                direction: now.direction,
+                radius: now.radius,
+                ..*end
+            };
+            if *end != moved {
+                *end = moved;
+                *transform = OpenEnd::pose(&now);
+            }
+        }
+    }
+}
+
+/// Number of bifurcations between a segment and its root.
+fn bifurcations_above(vessels: &Vessels, place: Place) -> u32 {
+    let tree: &VesselTree = vessels.tree();
+    let above = std::iter::successors(tree.parent(place.node), |&node| tree.parent(node));
+    above.filter(|node| vessels.children(node.index()).nth(1).is_some()).count() as u32
+}

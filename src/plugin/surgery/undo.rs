@@ -1,0 +1,136 @@
+//! In which order undo takes back what was done: one entry for each action, or for each stroke of an instrument.
+//!
+//! A ledger undoes its own actions in the reverse of their order. What is undone together must therefore be the last on
+//! each ledger that it changed: entries are joined where a stroke goes on after something else was done to its vessels.
+
+use crate::plugin::surgery::messages::StrokeId;
+use bevy::ecs::entity::Entity;
+
+/// Everything that can be undone, in the order in which it was begun.
+#[derive(Debug, Default)]
+pub(crate) struct UndoHistory {
+    entries: Vec<Entry>,
+}
+
+/// What is undone at once.
+#[derive(Debug, Default)]
+struct Entry {
+    /// None for an action by itself; several where strokes were joined.
+    strokes: Vec<StrokeId>,
+    /// Vessel entities, each once, and how many actions of their ledgers belong to this.
+    changed: Vec<(Entity, usize)>,
+}
+
+impl Entry {
+    fn has(&self, vessels: Entity) -> bool {
+        self.changed.iter().any(|&(entity, _)| entity == vessels)
+    }
+
+    fn add(&mut self, vessels: Entity, actions: usize) {
+        match self.changed.iter_mut().find(|(entity, _)| *entity == vessels) {
+            Some((_, count)) => *count += actions,
+            None => self.changed.push((vessels, actions)),
+        }
+    }
+}
+
+impl UndoHistory {
+    /// Takes note of an action that changed the ledgers of some vessel entities.
+    pub(crate) fn note(&mut self, stroke: Option<StrokeId>, changed: impl Iterator<Item = Entity> + Clone) {
+        let begun = stroke.and_then(|stroke| self.entries.iter().rposition(|entry| entry.strokes.contains(&stroke)));
+        let at = begun.unwrap_or_else(|| {
+            self.entries.push(Entry { strokes: stroke.into_iter().collect(), ..Entry::default() });
+            self.entries.len() - 1
+        });
+        if self.entries[at + 1..].iter().any(|later| changed.clone().any(|vessels| later.has(vessels))) {
+            self.join_from(at);
+        }
+        changed.for_each(|vessels| self.entries[at].add(vessels, 1));
+    }
+
+    /// Makes one entry of all from a number on.
+    fn join_from(&mut self, at: usize) {
+        for later in self.entries.split_off(at + 1) {
+            self.entries[at].strokes.extend(later.strokes);
+            later.changed.into_iter().for_each(|(vessels, actions)| self.entries[at].add(vessels, actions));
+        }
+    }
+
+    /// Takes out the last entry that has to do with some of these vessel entities, as far as it does: how many actions
+    /// are to be undone on which of them.
+    pub(crate) fn take_last(&mut self, is_meant: impl Fn(Entity) -> bool) -> Option<Vec<(Entity, usize)>> {
+        let at = self.entries.iter().rposition(|entry| entry.changed.iter().any(|&(vessels, _)| is_meant(vessels)))?;
+        let (taken, left) = std::mem::take(&mut self.entries[at].changed)
+            .into_iter()
+            .partition::<Vec<_>, _>(|&(vessels, _)| is_meant(vessels));
+        self.entries[at].changed = left;
+        if self.entries[at].changed.is_empty() {
+            self.entries.remove(at);
+        }
+        Some(taken)
+    }
+
+    /// Strikes vessel entities from what can be undone.
+    pub(crate) fn forget(&mut self, is_meant: impl Fn(Entity) -> bool) {
+        self.entries.iter_mut().for_each(|entry| entry.changed.retain(|&(vessels, _)| !is_meant(vessels)));
+        self.entries.retain(|entry| !entry.changed.is_empty());
+    }
+
+    /// Number of entries.
+    pub(crate) fn len(&self) -> usize {
+        self.entries.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::plugin::surgery::undo::*;
+
+    fn vessels(indices: &[u32]) -> impl Iterator<Item = Entity> + Clone {
+        indices.iter().filter_map(|&index| Entity::from_raw_u32(index))
+    }
+
+    fn taken(history: &mut UndoHistory) -> Vec<(u32, usize)> {
+        let taken = history.take_last(|_| true).unwrap_or_default();
+        taken.into_iter().map(|(vessels, actions)| (vessels.index_u32(), actions)).collect()
+    }
+
+    #[test]
+    fn a_stroke_is_one_entry_wherever_it_goes() {
+        let (mut history, stroke) = (UndoHistory::default(), Some(StrokeId::begin()));
+        history.note(None, vessels(&[1]));
+        for changed in [&[1, 2][..], &[2], &[1]] {
+            history.note(stroke, vessels(changed));
+        }
+        assert_eq!(history.len(), 2);
+        assert_eq!(taken(&mut history), [(1, 2), (2, 2)]);
+        assert_eq!(taken(&mut history), [(1, 1)]);
+    }
+
+    #[test]
+    fn strokes_on_other_vessels_stay_apart_and_those_on_the_same_are_joined() {
+        let (mut history, [left, right]) = (UndoHistory::default(), [(); 2].map(|()| Some(StrokeId::begin())));
+        for _ in 0..3 {
+            history.note(left, vessels(&[1]));
+            history.note(right, vessels(&[2]));
+        }
+        assert_eq!(history.len(), 2);
+        history.note(None, vessels(&[1]));
+        history.note(left, vessels(&[1]));
+        assert_eq!(history.len(), 1, "the left stroke cannot be taken back without what was done to its vessels since");
+        history.note(right, vessels(&[3]));
+        assert_eq!(taken(&mut history), [(1, 5), (2, 3), (3, 1)]);
+        assert_eq!(taken(&mut history), []);
+    }
+
+    #[test]
+    fn what_is_meant_for_some_leaves_the_others() {
+        let (mut history, stroke) = (UndoHistory::default(), Some(StrokeId::begin()));
+        (0..2).for_each(|_| history.note(stroke, vessels(&[1, 2])));
+        history.note(None, vessels(&[3]));
+        let first = history.take_last(|vessels| vessels.index_u32() == 2).unwrap_or_default();
+        assert_eq!((first.len(), history.len()), (1, 2));
+        history.forget(|vessels| vessels.index_u32() == 3);
+        assert_eq!(taken(&mut history), [(1, 2)]);
+    }
+}

@@ -1,0 +1,82 @@
+//! How vessels look, said on their organ.
+
+use crate::{
+    plugin::vessels::{relations::OrganVessels, tree::Vessels},
+    synthesis::tree::{ByKind, VesselKind},
+};
+use bevy::{
+    camera::visibility::Visibility,
+    color::Color,
+    ecs::{
+        change_detection::DetectChangesMut, component::Component, query::Changed, reflect::ReflectComponent,
+        system::Query,
+    },
+    reflect::{Reflect, std_traits::ReflectDefault},
+};
+
+/// What the colour of a segment tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Default, Clone, PartialEq)]
+pub enum SegmentColoring {
+    /// What kind of vessel it is.
+    #[default]
+    Kind,
+    /// How thick it is.
+    Radius,
+    /// In which step it was born.
+    Age,
+    /// Its Strahler order: 1 for terminals, rising towards the root.
+    StrahlerOrder,
+    /// How much of its blood it still carries: the kind's colour where that is all, pale where it is none. Of use once
+    /// vessels are cut or clamped.
+    Supply,
+}
+
+/// How an organ's vessels look.
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct VesselAppearance {
+    /// Colour of each kind of vessels.
+    ///
+    /// Default: [`Self::DEFAULT_COLORS`].
+    pub colors: ByKind<Color>,
+    /// What the colours tell. Default: the kind.
+    pub coloring: SegmentColoring,
+    /// Which kinds are shown. Default: all.
+    pub shown: ByKind<bool>,
+}
+
+impl VesselAppearance {
+    /// Default colours. Arteries: blood full of oxygen, seen through a wall. Veins: the blue violet in which textbooks and
+    /// thin walls show them. Portal veins: the same, darker. Ducts: the green of bile.
+    pub const DEFAULT_COLORS: ByKind<Color> = ByKind {
+        artery: Color::srgb(0.62, 0.05, 0.06),
+        vein: Color::srgb(0.25, 0.16, 0.47),
+        portal_vein: Color::srgb(0.17, 0.13, 0.40),
+        duct: Color::srgb(0.30, 0.42, 0.14),
+    };
+
+    /// What the vessel entity of a kind is given.
+    pub(crate) fn visibility(&self, kind: VesselKind) -> Visibility {
+        if self.shown[kind] { Visibility::Inherited } else { Visibility::Hidden }
+    }
+}
+
+impl Default for VesselAppearance {
+    fn default() -> Self {
+        Self { colors: Self::DEFAULT_COLORS, coloring: SegmentColoring::default(), shown: ByKind::from_fn(|_| true) }
+    }
+}
+
+/// Publish: shows and hides kinds of vessels as the organ's appearance says.
+pub(crate) fn show_kinds(
+    organs: Query<(&VesselAppearance, &OrganVessels), Changed<VesselAppearance>>,
+    mut vessels: Query<(&Vessels, &mut Visibility)>,
+) {
+    for (appearance, entities) in &organs {
+        let mut vessels = vessels.iter_many_mut(entities.entities());
+        while let Some((vessels, mut visibility)) = vessels.fetch_next() {
+            visibility.set_if_neq(appearance.visibility(vessels.kind()));
+        }
+    }
+}

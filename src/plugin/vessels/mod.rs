@@ -1,0 +1,68 @@
+//! Vessel entities: the tree of one kind of vessels, what changed in it, what was done to it, and how it looks.
+
+use crate::plugin::order::{self, VesselSystems};
+use bevy::{
+    app::{App, Plugin, Update},
+    ecs::{
+        intern::Interned,
+        schedule::{IntoScheduleConfigs, ScheduleLabel},
+    },
+};
+
+pub(crate) mod appearance;
+pub(crate) mod change_log;
+pub(crate) mod index;
+pub(crate) mod pick;
+pub(crate) mod relations;
+pub(crate) mod tree;
+pub(crate) mod wounds;
+
+pub use appearance::{SegmentColoring, VesselAppearance};
+pub use change_log::SegmentChanges;
+pub use index::VesselIndex;
+pub use pick::{VesselPicker, VesselPlace};
+pub use relations::{OrganVessels, VesselsOf};
+pub use tree::Vessels;
+pub use wounds::VesselWounds;
+
+/// What every room needs of vessel entities: that they are shown or hidden, and indexed.
+///
+/// The other plugins of vessels add it themselves.
+#[derive(Clone, Debug)]
+pub struct VesselsPlugin {
+    schedule: Interned<dyn ScheduleLabel>,
+}
+
+impl VesselsPlugin {
+    /// Runs in another schedule than `Update`.
+    #[must_use]
+    pub fn in_schedule(schedule: impl ScheduleLabel) -> Self {
+        Self { schedule: schedule.intern() }
+    }
+
+    /// Adds the plugin, unless the app has it.
+    pub(crate) fn ensure(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
+        if !app.is_plugin_added::<Self>() {
+            app.add_plugins(Self { schedule });
+        }
+    }
+}
+
+impl Default for VesselsPlugin {
+    fn default() -> Self {
+        Self::in_schedule(Update)
+    }
+}
+
+impl Plugin for VesselsPlugin {
+    fn build(&self, app: &mut App) {
+        order::configure(app, self.schedule);
+        app.add_systems(
+            self.schedule,
+            (
+                appearance::show_kinds.in_set(VesselSystems::Publish),
+                index::index_vessels.after(VesselSystems::Follow).before(VesselSystems::Cut),
+            ),
+        );
+    }
+}

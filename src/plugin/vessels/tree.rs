@@ -1,0 +1,231 @@
+//! The tree of a vessel entity, kept up to date with a growth at the cost of what changed.
+
+use crate::plugin::vessels::change_log::SegmentChanges;
+use crate::synthesis::{
+    binding::{Binding, BindingError},
+    growth::GrownTree,
+    tree::{NO_PARENT, NodeId, VesselKind, VesselTree},
+};
+use bevy::{
+    camera::{primitives::Aabb, visibility::Visibility},
+    ecs::component::Component,
+    math::Vec3,
+    transform::components::Transform,
+};
+use std::{
+    borrow::Cow,
+    sync::atomic::{AtomicU64, Ordering},
+};
+
+/// Tells one tree from another that took its place. The same while a tree grows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Lineage(u64);
+
+impl Lineage {
+    /// One that no other tree has.
+    pub fn new_one() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+/// The vessels of one kind of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
+/// off its surface where the settings say so.
+#[derive(Component, Clone, Debug)]
+#[require(SegmentChanges, Transform, Visibility)]
+pub struct Vessels {
+    kind: VesselKind,
+    tree: VesselTree,
+    lineage: Lineage,
+    birth_steps: Vec<u32>,
+    /// First child of every node, [`NO_PARENT`] for none.
+    first_children: Vec<u32>,
+    /// Next child of the same parent, [`NO_PARENT`] for the last.
+    next_siblings: Vec<u32>,
+    bounds: Option<(Vec3, Vec3)>,
+    /// Positions at rest, while the organ is deformed.
+    rest: Option<Vec<Vec3>>,
+}
+
+impl Vessels {
+    /// No vessels yet.
+    pub(crate) fn new(kind: VesselKind) -> Self {
+        Self {
+            kind,
+            tree: VesselTree::new(),
+            lineage: Lineage::default(),
+            birth_steps: Vec::new(),
+            first_children: Vec::new(),
+            next_siblings: Vec::new(),
+            bounds: None,
+            rest: None,
+        }
+    }
+
+    /// Vessels that did not grow here, such as a network read from a file, to be drawn like others.
+    ///
+    /// They count as other vessels than those that they replace, so that wounds of these are forgotten. Put them on an
+    /// entity that is [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. Whoever replaces them later marks what
+    /// became different in the entity's [`SegmentChanges`]. Nodes beyond the end of `birth_steps` count as born in
+    /// step 0.
+    pub fn from_tree(kind: VesselKind, tree: &VesselTree, birth_steps: &[u32]) -> Self {
+        let mut vessels = Self { lineage: Lineage::new_one(), ..Self::new(kind) };
+        for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
+            vessels.push(position, tree.parents()[node], radius, birth_steps.get(node).copied().unwrap_or(0));
+        }
+        vessels
+    }
+
+    /// What kind of vessels these are.
+    pub fn kind(&self) -> VesselKind {
+        self.kind
+    }
+
+    /// The tree. While the organ grows, it only gets longer and thicker; a restart empties it. With
+    /// [`FollowsMesh`](crate::plugin::FollowsMesh) its nodes are where the deformed organ has them.
+    pub fn tree(&self) -> &VesselTree {
+        &self.tree
+    }
+
+    /// Which tree it is.
+    pub(crate) fn lineage(&self) -> Lineage {
+        self.lineage
+    }
+
+    /// The step in which each node was born, 0 for roots.
+    pub fn birth_steps(&self) -> &[u32] {
+        &self.birth_steps
+    }
+
+    /// A box that holds every segment, radii included; of no size where there is none.
+    ///
+    /// While vessels grow at rest it only becomes larger.
+    pub fn aabb(&self) -> Aabb {
+        self.bounds.map_or_else(Aabb::default, |(min, max)| Aabb::from_min_max(min, max))
+    }
+
+    /// Takes over what the growth changed: `changed` nodes and all new ones, or everything where that is `None`.
+    ///
+    /// Without a growth nothing is left. All segments that are other than before are marked in `changes`.
+    pub(crate) fn follow(
+        &mut self,
+        grown: Option<GrownTree>,
+        lineage: Lineage,
+        changed: Option<&[u32]>,
+        changes: &mut SegmentChanges,
+    ) {
+        self.lineage = lineage;
+        if changed.is_none() {
+            self.clear();
+            changes.mark_all();
+        }
+        let Some(grown) = grown else { return };
+        let known = self.tree.len();
+        for node in known..grown.tree.len() {
+            self.append(&grown, node);
+            changes.mark_node(node);
+        }
+        for &node in changed.unwrap_or_default() {
+            let node = node as usize;
+            if node < known {
+                self.update(&grown, node);
+                changes.mark_node(node);
+                self.children(node).for_each(|child| changes.mark_node(child));
+            }
+        }
+    }
+
+    fn clear(&mut self) {
+        self.tree.clear();
+        self.birth_steps.clear();
+        self.first_children.clear();
+        self.next_siblings.clear();
+        self.bounds = None;
+        self.rest = None;
+    }
+
+    /// The tree where it grew, however its organ is deformed.
+    pub(crate) fn tree_at_rest(&self) -> Cow<'_, VesselTree> {
+        let Some(rest) = &self.rest else { return Cow::Borrowed(&self.tree) };
+        let mut tree = self.tree.clone();
+        tree.positions_mut().copy_from_slice(rest);
+        Cow::Owned(tree)
+    }
+
+    /// Moves the nodes with the organ's vertices. Nodes that are not bound yet are bound first.
+    pub(crate) fn deform(&mut self, binding: &mut Binding, vertices: &[Vec3]) -> Result<(), BindingError> {
+        let rest = self.rest.get_or_insert_with(|| self.tree.positions().to_vec());
+        if binding.len() != self.tree.len() {
+            self.tree.positions_mut().copy_from_slice(rest);
+            binding.extend(&self.tree);
+        }
+        binding.follow_into(vertices, self.tree.positions_mut())?;
+        self.bounds = None;
+        (0..self.tree.len()).for_each(|node| self.enclose(node));
+        Ok(())
+    }
+
+    /// Brings the nodes back to where they grew, and says whether they were elsewhere.
+    pub(crate) fn come_to_rest(&mut self) -> bool {
+        let Some(rest) = self.rest.take() else { return false };
+        self.tree.positions_mut().copy_from_slice(&rest);
+        self.bounds = None;
+        (0..self.tree.len()).for_each(|node| self.enclose(node));
+        true
+    }
+
+    fn append(&mut self, grown: &GrownTree, node: usize) {
+        let GrownTree { tree, birth_steps, .. } = grown;
+        let position = grown.lifted_position(NodeId(node as u32));
+        self.push(position, tree.parents()[node], tree.radii()[node], birth_steps[node]);
+    }
+
+    fn push(&mut self, position: Vec3, parent: u32, radius: f32, birth_step: u32) {
+        let node = self.tree.len();
+        let sibling = match parent {
+            NO_PARENT => {
+                self.tree.push_root(position, radius);
+                NO_PARENT
+            }
+            parent => {
+                self.tree.push_child(NodeId(parent), position, radius);
+                std::mem::replace(&mut self.first_children[parent as usize], node as u32)
+            }
+        };
+        self.first_children.push(NO_PARENT);
+        self.next_siblings.push(sibling);
+        self.birth_steps.push(birth_step);
+        if let Some(rest) = &mut self.rest {
+            rest.push(position);
+        }
+        self.enclose(node);
+    }
+
+    fn update(&mut self, grown: &GrownTree, node: usize) {
+        let position = grown.lifted_position(NodeId(node as u32));
+        self.tree.positions_mut()[node] = position;
+        if let Some(rest) = &mut self.rest {
+            rest[node] = position;
+        }
+        self.tree.radii_mut()[node] = grown.tree.radii()[node];
+        self.enclose(node);
+    }
+
+    fn enclose(&mut self, node: usize) {
+        let (position, radius) = (self.tree.positions()[node], self.tree.radii()[node]);
+        let (min, max) = self.bounds.unwrap_or((position, position));
+        self.bounds = Some((min.min(position - radius), max.max(position + radius)));
+    }
+
+    pub(crate) fn children(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+        let link = |child: u32| (child != NO_PARENT).then_some(child as usize);
+        std::iter::successors(link(self.first_children[node]), move |&child| link(self.next_siblings[child]))
+    }
+}
+
+/// Which tree of a growth it is makes no difference.
+impl PartialEq for Vessels {
+    fn eq(&self, other: &Self) -> bool {
+        (self.kind, &self.tree, &self.birth_steps) == (other.kind, &other.tree, &other.birth_steps)
+    }
+}

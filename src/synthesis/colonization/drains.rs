@@ -1,0 +1,327 @@
+//! Attraction points: oxygen drains for the arteries, carbon-dioxide sources for the veins.
+//!
+//! A drain is born in tissue that no vessel supplies, acts on its nearest open node, and leaves once it is supplied. It
+//! keeps that node between steps and is told of what happens to it, so that a step costs as much as happens in it, however
+//! many drains wait:
+//!
+//! - a new node [makes itself known](News) to the drains within reach, and may become their nearest;
+//! - a node that closes, or hears in another way than before, [wakes](Drains::wake) the drains that wait at it;
+//! - all other drains sleep. Asked again, they would answer as they did before.
+
+use crate::synthesis::parallel;
+use crate::synthesis::space::point_grid::PointGrid;
+use bevy_math::{Vec3, bounding::Aabb3d};
+
+/// What stands for no node and no drain.
+const NONE: u32 = u32::MAX;
+
+/// What a drain knows of the vessels around it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hearing {
+    /// Its nearest open node, as of when it was last looked for; [`NONE`] for no node within reach.
+    node: u32,
+    /// Squared distance to that node, infinite without one.
+    pub distance: f32,
+    /// Squared distance to the nearest node of any kind within reach, infinite without one.
+    pub closest: f32,
+    /// Cosine of the angle between the node's direction and the way from it to the drain.
+    pub cos: f32,
+    /// The drains that wait at the same node, before and after this one.
+    before: u32,
+    after: u32,
+}
+
+impl Hearing {
+    const NOBODY: Self =
+        Self { node: NONE, distance: f32::INFINITY, closest: f32::INFINITY, cos: 1.0, before: NONE, after: NONE };
+
+    /// The nearest open node, as far as is known.
+    pub fn node(&self) -> Option<u32> {
+        (self.node != NONE).then_some(self.node)
+    }
+}
+
+/// How a drain is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// The slot is free.
+    Gone,
+    /// Nothing has happened since the drain was found not to act.
+    Asleep,
+    /// To be asked in the next step.
+    Awake,
+    /// To look for its nearest open node in the next step.
+    Searching,
+}
+
+/// A node that a drain found to be its nearest open one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Found {
+    /// The node, if there is one within reach.
+    pub node: Option<u32>,
+    /// Squared distance to it.
+    pub distance: f32,
+    /// Squared distance to the nearest node of any kind, infinite without one.
+    pub closest: f32,
+    /// Cosine of the angle between the node's direction and the way to the drain.
+    pub cos: f32,
+}
+
+/// A new node that a drain has to know of.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Heard {
+    pub node: u32,
+    pub drain: u32,
+    /// Squared distance between them.
+    pub distance: f32,
+}
+
+/// New nodes whose drains one thread looks for at a time.
+const NODES_PER_SHARE: usize = 256;
+
+/// Which drains hear of new nodes. Keeps its buffers.
+#[derive(Debug, Default)]
+pub(crate) struct News {
+    /// What is heard, by share of the nodes.
+    shares: Vec<Vec<Heard>>,
+}
+
+impl News {
+    /// Finds for each of some nodes, which are numbered from `first` on, the drains within `reach` to which it is news.
+    pub fn spread(&mut self, drains: &Drains, first: u32, positions: &[Vec3], reach: f32) {
+        let count = positions.len().div_ceil(NODES_PER_SHARE);
+        if self.shares.len() < count {
+            self.shares.resize_with(count, Vec::new);
+        }
+        self.shares.iter_mut().for_each(Vec::clear);
+        parallel::for_each(&mut self.shares[..count], |share, heard| {
+            let start = share * NODES_PER_SHARE;
+            let end = positions.len().min(start + NODES_PER_SHARE);
+            for (node, &position) in (first + start as u32..).zip(&positions[start..end]) {
+                drains.grid.for_each_within(position, reach, |drain, distance| {
+                    let known = &drains.hearing[drain as usize];
+                    if distance < known.distance || distance < known.closest {
+                        heard.push(Heard { node, drain, distance });
+                    }
+                });
+            }
+        });
+    }
+
+    /// What is heard, by the number of the nodes.
+    pub fn iter(&self) -> impl Iterator<Item = Heard> + '_ {
+        self.shares.iter().flatten().copied()
+    }
+}
+
+/// The attraction points of one system.
+#[derive(Debug, Default)]
+pub(crate) struct Drains {
+    grid: PointGrid,
+    hearing: Vec<Hearing>,
+    states: Vec<State>,
+    /// First drain that waits at each node.
+    waiting: Vec<u32>,
+    /// Drains to be asked in the next step, in no order.
+    awake: Vec<u32>,
+    /// Slots of drains that left, to be used again.
+    free: Vec<u32>,
+}
+
+impl Drains {
+    /// Removes all drains and covers a box with cells of a given side, keeping memory.
+    pub fn reset(&mut self, bounds: &Aabb3d, cell: f32) {
+        self.grid.reset(bounds, cell);
+        self.hearing.clear();
+        self.states.clear();
+        self.waiting.clear();
+        self.awake.clear();
+        self.free.clear();
+    }
+
+    /// Follows lengths that have changed: finer cells for shorter ones.
+    pub fn resize_cells(&mut self, cell: f32) {
+        self.grid.resize_cells(cell);
+    }
+
+    /// Number of living drains.
+    pub fn len(&self) -> usize {
+        self.states.len() - self.free.len()
+    }
+
+    /// Adds a drain that is to look for a node, and gives its slot.
+    pub fn add(&mut self, position: Vec3) -> u32 {
+        let slot = if let Some(slot) = self.free.pop() {
+            self.grid.replace(slot, position);
+            slot
+        } else {
+            self.hearing.push(Hearing::NOBODY);
+            self.states.push(State::Gone);
+            self.grid.push(position)
+        };
+        self.hearing[slot as usize] = Hearing::NOBODY;
+        self.states[slot as usize] = State::Searching;
+        self.awake.push(slot);
+        slot
+    }
+
+    /// Removes a living drain.
+    pub fn remove(&mut self, slot: u32) {
+        self.grid.remove(slot);
+        self.detach(slot);
+        // It may be in the list of those awake, which then lets go of it.
+        self.states[slot as usize] = State::Gone;
+        self.free.push(slot);
+    }
+
+    /// Where a drain is.
+    pub fn position(&self, slot: u32) -> Vec3 {
+        self.grid.point(slot)
+    }
+
+    /// Slots and positions of all living drains, in the order of their slots.
+    pub fn living(&self) -> impl Iterator<Item = (u32, Vec3)> + '_ {
+        self.slots().map(|slot| (slot, self.position(slot)))
+    }
+
+    /// The living drains' slots, in order.
+    pub fn slots(&self) -> impl Iterator<Item = u32> + '_ {
+        let living = |&(_, &state): &(usize, &State)| state != State::Gone;
+        self.states.iter().enumerate().filter(living).map(|(slot, _)| slot as u32)
+    }
+
+    /// The index over all drains.
+    pub fn index(&self) -> &PointGrid {
+        &self.grid
+    }
+
+    /// What a drain knows.
+    pub fn hearing(&self, slot: u32) -> &Hearing {
+        &self.hearing[slot as usize]
+    }
+
+    /// Drains to be asked in this step, in no order that means anything.
+    pub fn awake(&self) -> &[u32] {
+        &self.awake
+    }
+
+    /// Whether a drain must look for its nearest open node.
+    pub fn is_searching(&self, slot: u32) -> bool {
+        self.states[slot as usize] == State::Searching
+    }
+
+    /// Tells a drain what it found when it looked for its nearest open node.
+    pub fn settle(&mut self, slot: u32, found: Found) {
+        self.detach(slot);
+        let own = &mut self.hearing[slot as usize];
+        *own = Hearing { closest: found.closest, ..Hearing::NOBODY };
+        self.states[slot as usize] = State::Awake;
+        if let Some(node) = found.node {
+            self.attach(slot, node, found.distance, found.cos);
+        }
+    }
+
+    /// Keeps those drains awake that `acts` is true for, and lets the others sleep.
+    pub fn keep_awake(&mut self, mut acts: impl FnMut(u32, &Hearing) -> bool) {
+        let (hearing, states) = (&self.hearing, &mut self.states);
+        self.awake.retain(|&slot| {
+            let stays = acts(slot, &hearing[slot as usize]);
+            if !stays {
+                states[slot as usize] = State::Asleep;
+            }
+            stays
+        });
+    }
+
+    /// Lets go of drains that left while they were awake.
+    pub fn forget_the_gone(&mut self) {
+        let states = &self.states;
+        self.awake.retain(|&slot| states[slot as usize] != State::Gone);
+    }
+
+    /// Wakes the drains that wait at a node, since it hears in another way than before. If it has `closed`, they look for
+    /// another one.
+    pub fn wake(&mut self, node: u32, closed: bool) {
+        let mut slot = self.waiting.get(node as usize).copied().unwrap_or(NONE);
+        while slot != NONE {
+            let state = &mut self.states[slot as usize];
+            if *state == State::Asleep {
+                self.awake.push(slot);
+            }
+            if closed {
+                *state = State::Searching;
+            } else if *state == State::Asleep {
+                *state = State::Awake;
+            }
+            slot = self.hearing[slot as usize].after;
+        }
+    }
+
+    /// Lets every drain look anew, for when reaches have grown.
+    pub fn wake_all(&mut self) {
+        for (slot, state) in self.states.iter_mut().enumerate() {
+            if *state == State::Asleep {
+                self.awake.push(slot as u32);
+            }
+            if *state != State::Gone {
+                *state = State::Searching;
+            }
+        }
+    }
+
+    /// Lets a drain know of a new open node with a segment in the given `direction`. Of two nodes at one distance the older
+    /// stays.
+    pub fn hear(&mut self, heard: Heard, position: Vec3, direction: Vec3) {
+        let Heard { node, drain: slot, distance } = heard;
+        let own = &mut self.hearing[slot as usize];
+        own.closest = own.closest.min(distance);
+        if distance < own.distance {
+            self.detach(slot);
+            let cos = cos_at(direction, position, self.grid.point(slot));
+            self.attach(slot, node, distance, cos);
+            let state = &mut self.states[slot as usize];
+            if *state == State::Asleep {
+                self.awake.push(slot);
+            }
+            *state = State::Awake;
+        }
+    }
+
+    /// Puts a drain first in the list of those that wait at a node.
+    fn attach(&mut self, slot: u32, node: u32, distance: f32, cos: f32) {
+        let Self { hearing, waiting, .. } = self;
+        if node as usize >= waiting.len() {
+            waiting.resize(node as usize + 1, NONE);
+        }
+        let after = std::mem::replace(&mut waiting[node as usize], slot);
+        if after != NONE {
+            hearing[after as usize].before = slot;
+        }
+        let own = &mut hearing[slot as usize];
+        *own = Hearing { node, distance, cos, before: NONE, after, closest: own.closest };
+    }
+
+    /// Takes a drain out of the list that it is in, if any.
+    fn detach(&mut self, slot: u32) {
+        let Hearing { node, before, after, .. } = self.hearing[slot as usize];
+        if node == NONE {
+            return;
+        }
+        match before {
+            NONE => self.waiting[node as usize] = after,
+            before => self.hearing[before as usize].after = after,
+        }
+        if after != NONE {
+            self.hearing[after as usize].before = before;
+        }
+        self.hearing[slot as usize].node = NONE;
+    }
+}
+
+/// What stands for the cosine of a drain on the node itself, which is in front of it as much as anywhere.
+pub(crate) const ON_THE_NODE: f32 = 2.0;
+
+/// Cosine of the angle between a direction and the way from a node to a drain.
+pub(crate) fn cos_at(direction: Vec3, node: Vec3, drain: Vec3) -> f32 {
+    (drain - node).try_normalize().map_or(ON_THE_NODE, |toward| direction.dot(toward).clamp(-1.0, 1.0))
+}

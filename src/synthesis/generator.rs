@@ -1,0 +1,182 @@
+//! All makers of vessels under one name: what a preset, a component and a command line hold.
+//!
+//! In: a tissue, roots and a seed. Out: a [`Growth`], whichever maker it is. To add a maker is to add a variant here.
+
+use crate::synthesis::{
+    colonization::{Colonization, ColonizationError, ColonizationSettings},
+    growth::{Growth, GrowthWarning},
+    roots::{RootSpacing, Roots},
+    tissue::{Extent, Tissue},
+    tree::ByKind,
+};
+use std::{any::Any, fmt, sync::Arc};
+
+/// What makes the vessels of an organ, with its settings.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub enum Generator {
+    /// Space colonization: arteries and veins that grow towards drains (Rauch & Harders 2021).
+    Colonization(ColonizationSettings),
+    /// A maker of your own. It can't be written to a file.
+    #[cfg_attr(feature = "serialize", serde(skip))]
+    Custom(CustomGenerator),
+}
+
+/// Why a generator cannot start.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GeneratorError {
+    /// Space colonization cannot.
+    #[error(transparent)]
+    Colonization(#[from] ColonizationError),
+    /// A maker of your own cannot.
+    #[error("{reason}")]
+    Custom {
+        /// What it says.
+        reason: String,
+    },
+}
+
+impl Generator {
+    /// Checks every setting against its limits, and names what is unusual.
+    ///
+    /// # Errors
+    /// The first setting outside its limits.
+    pub fn validate(&self) -> Result<Vec<GrowthWarning>, GeneratorError> {
+        match self {
+            Self::Colonization(settings) => {
+                let warnings = settings.validate().map_err(ColonizationError::from)?;
+                Ok(warnings.iter().map(GrowthWarning::new).collect())
+            }
+            Self::Custom(_) => Ok(Vec::new()),
+        }
+    }
+
+    /// Fits settings that are made for a tissue of equivalent diameter 1, as those of all presets are, to a tissue of any
+    /// size.
+    #[must_use]
+    pub fn fit(self, extent: Extent) -> Self {
+        match self {
+            Self::Colonization(settings) => Self::Colonization(settings.fit(extent)),
+            Self::Custom(custom) => Self::Custom(custom.scaled(extent.equivalent_diameter())),
+        }
+    }
+
+    /// Multiplies every length by `factor`.
+    #[must_use]
+    pub fn scaled(self, factor: f32) -> Self {
+        match self {
+            Self::Colonization(settings) => Self::Colonization(settings.scaled(factor)),
+            Self::Custom(custom) => Self::Custom(custom.scaled(factor)),
+        }
+    }
+
+    /// What the placement of roots needs to know, for each kind of vessels that this generator grows.
+    pub fn root_spacing(&self) -> ByKind<Option<RootSpacing>> {
+        match self {
+            Self::Colonization(settings) => settings.root_spacing(),
+            Self::Custom(custom) => custom.maker.root_spacing(custom.scale),
+        }
+    }
+
+    /// Starts a growth. Lengths in the settings are the tissue's: see [`fit`](Self::fit).
+    ///
+    /// # Errors
+    /// A setting outside its limits, or roots that cannot be put where they are asked for.
+    pub fn start(&self, tissue: Arc<dyn Tissue>, roots: &Roots, seed: u64) -> Result<Box<dyn Growth>, GeneratorError> {
+        match self {
+            Self::Colonization(settings) => Ok(Box::new(Colonization::new(tissue, settings.clone(), roots, seed)?)),
+            Self::Custom(custom) => {
+                let started = custom.maker.start(tissue, roots, custom.scale, seed);
+                started.map_err(|reason| GeneratorError::Custom { reason })
+            }
+        }
+    }
+
+    /// Starts a growth in place of another one, and uses the memory of that where both are of one maker and on one tissue.
+    ///
+    /// # Errors
+    /// As [`start`](Self::start).
+    pub fn restart(
+        &self,
+        growth: Box<dyn Growth>,
+        tissue: Arc<dyn Tissue>,
+        roots: &Roots,
+        seed: u64,
+    ) -> Result<Box<dyn Growth>, GeneratorError> {
+        let growth: Box<dyn Any> = growth;
+        match (self, growth.downcast::<Colonization>()) {
+            (Self::Colonization(settings), Ok(mut growth)) if Arc::ptr_eq(growth.tissue(), &tissue) => {
+                growth.restart(settings.clone(), roots, seed)?;
+                Ok(growth)
+            }
+            _ => self.start(tissue, roots, seed),
+        }
+    }
+
+    /// The settings of space colonization, if this is it.
+    pub fn colonization(&self) -> Option<&ColonizationSettings> {
+        match self {
+            Self::Colonization(settings) => Some(settings),
+            Self::Custom(_) => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn colonization_mut(&mut self) -> Option<&mut ColonizationSettings> {
+        match self {
+            Self::Colonization(settings) => Some(settings),
+            Self::Custom(_) => None,
+        }
+    }
+}
+
+impl Default for Generator {
+    fn default() -> Self {
+        Self::Colonization(ColonizationSettings::default())
+    }
+}
+
+impl From<ColonizationSettings> for Generator {
+    fn from(settings: ColonizationSettings) -> Self {
+        Self::Colonization(settings)
+    }
+}
+
+/// A maker of vessels that is not part of this crate, for [`CustomGenerator`].
+pub trait GrowthMaker: fmt::Debug + Send + Sync {
+    /// For each kind of vessels that it grows, what the placement of roots needs to know. All lengths of the maker are to be
+    /// multiplied by `scale`.
+    fn root_spacing(&self, scale: f32) -> ByKind<Option<RootSpacing>>;
+
+    /// Starts a growth, with all lengths multiplied by `scale`. [`Roots::resolve`] says where roots are.
+    ///
+    /// # Errors
+    /// Why it cannot, in words that name the value and the remedy.
+    fn start(&self, tissue: Arc<dyn Tissue>, roots: &Roots, scale: f32, seed: u64) -> Result<Box<dyn Growth>, String>;
+}
+
+/// A maker of vessels of your own. Two are equal if they share one maker and its scale.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
+pub struct CustomGenerator {
+    maker: Arc<dyn GrowthMaker>,
+    scale: f32,
+}
+
+impl CustomGenerator {
+    /// A generator of a maker, whose lengths are as they stand.
+    pub fn new(maker: impl GrowthMaker + 'static) -> Self {
+        Self { maker: Arc::new(maker), scale: 1.0 }
+    }
+
+    fn scaled(self, factor: f32) -> Self {
+        Self { scale: self.scale * factor, ..self }
+    }
+}
+
+impl PartialEq for CustomGenerator {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.maker, &other.maker) && self.scale == other.scale
+    }
+}

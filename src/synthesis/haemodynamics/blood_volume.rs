@@ -1,0 +1,171 @@
+//! How much blood a patient has left, and what its loss does to the pressure.
+//!
+//! The pressure keeps up while the body compensates, then falls ever faster: with f the share of the blood lost, it is
+//! 1 up to f₀, 1 − ((f − f₀)/(f₁ − f₀))² of itself up to f₁, and 0 beyond.
+//!
+//! Source: a loss below 15 % changes arterial pressure little, one of 15 to 40 % lowers it by its amount, more than 40 %
+//! is life-threatening (Klabunde, Cardiovascular Physiology Concepts, "Hemorrhagic Shock"); it falls to zero when 35 to
+//! 45 % are lost fast (Guyton & Hall, Textbook of Medical Physiology, chapter on circulatory shock). The parabola
+//! between is ours. Refilling from tissue takes hours and is left out.
+
+use crate::synthesis::{haemodynamics::FlowError, units::Volume};
+
+/// Settings of a patient's blood.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub struct BloodVolumeSettings {
+    /// All the patient's blood before any loss.
+    ///
+    /// Lower values, as in a child, make the same wound matter more.
+    ///
+    /// Limits: finite, > 0. Default: [`Self::DEFAULT_TOTAL`].
+    pub total: Volume,
+    /// Whether a loss lowers the pressure. If not, the heart keeps it up whatever is lost.
+    ///
+    /// Default: true.
+    pub lowers_pressure: bool,
+    /// Share of the blood that can be lost without effect on the pressure.
+    ///
+    /// Limits: 0 to [`exhausted`](Self::exhausted). Default: [`Self::DEFAULT_COMPENSATED`].
+    pub compensated: f32,
+    /// Share of the blood whose loss leaves no pressure.
+    ///
+    /// Limits: above [`compensated`](Self::compensated), at most 1. Default: [`Self::DEFAULT_EXHAUSTED`].
+    pub exhausted: f32,
+}
+
+impl BloodVolumeSettings {
+    /// Default of the blood volume, in millilitres: 70 mL for each of an adult's 70 kg.
+    pub const DEFAULT_TOTAL: f64 = 4900.0;
+    /// Default of the share that is compensated.
+    pub const DEFAULT_COMPENSATED: f32 = 0.15;
+    /// Default of the share that leaves no pressure.
+    pub const DEFAULT_EXHAUSTED: f32 = 0.45;
+
+    /// Share of the pressure that a loss leaves.
+    pub fn pressure_share(&self, lost: Volume) -> f64 {
+        if !self.lowers_pressure {
+            return 1.0;
+        }
+        let (from, to) = (f64::from(self.compensated), f64::from(self.exhausted));
+        let share = lost.cubic_metres() / self.total.cubic_metres();
+        let x = ((share - from) / (to - from)).clamp(0.0, 1.0);
+        1.0 - x * x
+    }
+
+    fn validate(&self) -> Result<(), FlowError> {
+        FlowError::check_positive("the blood volume in mL", self.total.ml())?;
+        let (from, to) = (f64::from(self.compensated), f64::from(self.exhausted));
+        FlowError::check_share("the share of blood whose loss is compensated", from)?;
+        FlowError::check_share("the share of blood whose loss leaves no pressure", to)?;
+        FlowError::check_positive("the share without pressure, above that compensated,", to - from)
+    }
+}
+
+impl Default for BloodVolumeSettings {
+    fn default() -> Self {
+        Self {
+            total: Volume::from_ml(Self::DEFAULT_TOTAL),
+            lowers_pressure: true,
+            compensated: Self::DEFAULT_COMPENSATED,
+            exhausted: Self::DEFAULT_EXHAUSTED,
+        }
+    }
+}
+
+/// The blood of one patient, which all bleeding organs share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BloodVolume {
+    settings: BloodVolumeSettings,
+    /// In m³.
+    lost: f64,
+}
+
+impl BloodVolume {
+    /// The blood of a patient who has lost none.
+    ///
+    /// # Errors
+    /// When a setting is outside its limits.
+    pub fn new(settings: BloodVolumeSettings) -> Result<Self, FlowError> {
+        settings.validate()?;
+        Ok(Self { settings, lost: 0.0 })
+    }
+
+    /// What all wounds together have lost.
+    pub fn lost(&self) -> Volume {
+        Volume::from_cubic_metres(self.lost)
+    }
+
+    /// Share of the blood that is lost; above 1 if more bled than there was, which only happens while the loss doesn't
+    /// lower the pressure.
+    pub fn lost_share(&self) -> f64 {
+        self.lost / self.settings.total.cubic_metres()
+    }
+
+    /// Share of the pressure that is left.
+    pub fn pressure_share(&self) -> f64 {
+        self.settings.pressure_share(self.lost())
+    }
+
+    /// Share of the pressure that is left when a volume in m³ more is lost.
+    pub(super) fn pressure_share_after(&self, more: f64) -> f64 {
+        self.settings.pressure_share(Volume::from_cubic_metres(self.lost + more))
+    }
+
+    /// Takes blood away.
+    pub fn lose(&mut self, volume: Volume) {
+        self.lost += volume.cubic_metres();
+    }
+
+    /// Gives blood back, at most what was lost.
+    pub fn transfuse(&mut self, volume: Volume) {
+        self.lost = (self.lost - volume.cubic_metres()).max(0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::synthesis::haemodynamics::blood_volume::*;
+
+    #[test]
+    fn the_pressure_holds_then_falls_to_nothing() {
+        let settings = BloodVolumeSettings::default();
+        let share = |f: f64| settings.pressure_share(Volume::from_ml(4900.0 * f));
+        assert_eq!(share(0.0), 1.0);
+        assert_eq!(share(0.15), 1.0);
+        assert!((share(0.30) - 0.75).abs() < 1e-6);
+        assert!((0.2..0.4).contains(&share(0.40)));
+        assert_eq!(share(0.46), 0.0);
+        let falling: Vec<f64> = (0..100).map(|i| share(f64::from(i) * 0.01)).collect();
+        assert!(falling.windows(2).all(|pair| pair[1] <= pair[0]));
+        let constant = BloodVolumeSettings { lowers_pressure: false, ..settings };
+        assert_eq!(constant.pressure_share(Volume::from_ml(1e6)), 1.0);
+    }
+
+    #[test]
+    fn transfusion_restores_the_pressure() {
+        let mut blood = BloodVolume::new(BloodVolumeSettings::default()).unwrap();
+        blood.lose(Volume::from_ml(1960.0));
+        assert!((blood.lost_share() - 0.4).abs() < 1e-12 && blood.pressure_share() < 0.4);
+        blood.transfuse(Volume::from_ml(1960.0));
+        assert_eq!(blood.pressure_share(), 1.0);
+        blood.transfuse(Volume::from_ml(5.0));
+        assert_eq!(blood.lost(), Volume::ZERO);
+    }
+
+    #[test]
+    fn settings_outside_their_limits_are_refused() {
+        let default = BloodVolumeSettings::default();
+        for bad in [
+            BloodVolumeSettings { total: Volume::ZERO, ..default },
+            BloodVolumeSettings { compensated: 0.5, ..default },
+            BloodVolumeSettings { compensated: -0.1, ..default },
+            BloodVolumeSettings { exhausted: 1.5, ..default },
+            BloodVolumeSettings { exhausted: f32::NAN, ..default },
+        ] {
+            assert!(BloodVolume::new(bad).is_err(), "{bad:?}");
+        }
+    }
+}

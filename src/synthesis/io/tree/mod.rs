@@ -1,0 +1,9 @@
+//! Files of vessel trees.
+
+mod csv;
+mod swc;
+mod swc_read;
+
+pub use csv::{save_csv, write_csv};
+pub use swc::{SwcOptions, save_swc, write_swc};
+pub use swc_read::{ReadError, SwcReadOptions, load_swc, read_swc};

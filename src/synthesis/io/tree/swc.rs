@@ -1,0 +1,56 @@
+//! SWC, the text format for trees of neurons and vessels: one line per node.
+//!
+//! Columns `id type x y z radius parent`, ids from 1, parent -1 for a root; lines that begin with `#` are comments.
+//! Source: Cannon, Turner, Pyapali & Wheal, "An on-line archive of reconstructed hippocampal neurons" (1998), and the
+//! `SWCplus` specification (neuroinformatics.nl/swcPlus). A file may have several roots.
+
+use crate::synthesis::io::{WriteError, write_atomically};
+use crate::synthesis::tree::{NO_PARENT, VesselTree};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// What an SWC file says beside the tree.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SwcOptions {
+    /// Lines of the header, such as the units of lengths, the seed and the preset. A line break begins a new line.
+    ///
+    /// Default: none. The name and version of this crate and the names of the columns are always there.
+    pub comments: Vec<String>,
+    /// The type column of every node: 0 is undefined, 1 to 4 are parts of a neuron, from 5 on the meaning is the user's.
+    ///
+    /// Default: 0.
+    pub structure: u32,
+}
+
+/// Writes a tree to an SWC file, whole or not at all. See [`write_swc`].
+///
+/// # Errors
+/// Those of [`write_atomically`].
+pub fn save_swc(path: impl AsRef<Path>, tree: &VesselTree, options: &SwcOptions) -> Result<(), WriteError> {
+    write_atomically(path, |out| write_swc(out, tree, options))
+}
+
+/// Writes a tree as SWC, nodes in the tree's order, lengths as they are.
+///
+/// Every number has the digits to be read back to the same bits. An empty tree gives a header alone.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_swc(mut out: impl Write, tree: &VesselTree, options: &SwcOptions) -> io::Result<()> {
+    writeln!(out, "# {} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))?;
+    for line in options.comments.iter().flat_map(|comment| comment.lines()) {
+        writeln!(out, "# {line}")?;
+    }
+    writeln!(out, "# id type x y z radius parent")?;
+    let nodes = tree.positions().iter().zip(tree.radii()).zip(tree.parents());
+    for (index, ((position, radius), &parent)) in nodes.enumerate() {
+        let (id, structure) = (index + 1, options.structure);
+        write!(out, "{id} {structure} {} {} {} {radius} ", position.x, position.y, position.z)?;
+        if parent == NO_PARENT {
+            writeln!(out, "-1")?;
+        } else {
+            writeln!(out, "{}", u64::from(parent) + 1)?;
+        }
+    }
+    Ok(())
+}

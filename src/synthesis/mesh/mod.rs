@@ -1,0 +1,22 @@
+//! Meshes: triangles of organs, checked once; the same with all that drawing needs; tetrahedra of soft bodies.
+//!
+//! In: positions and indices as a file or an engine's mesh holds them. Out: a [`TriangleMesh`] that every later stage can
+//! work with, its [`topology`], an index of its triangles ([`TriangleIndex`]) and its voxels.
+
+mod shaded;
+pub(crate) mod tet_mesh;
+pub mod topology;
+pub mod triangle_index;
+mod triangle_mesh;
+pub(crate) mod voxels;
+pub(crate) mod winding;
+
+pub use shaded::ShadedMesh;
+pub use tet_mesh::{TetMesh, TetMeshError};
+pub use topology::{MeshTopology, Welding};
+pub use triangle_index::{SurfacePoint, TriangleIndex};
+pub use triangle_mesh::{MAX_COORDINATE, MAX_TRIANGLES, MeshError, TriangleMesh};
+
+pub use voxels::VoxelError;
+
+pub(crate) use triangle_mesh::{doubled_normal, is_usable, tetrahedron_volume, unit};

@@ -1,0 +1,7 @@
+//! Randomness that is the same on every platform: streams from one seed, many numbers at once, and choice by weight.
+
+pub(crate) mod alias_table;
+pub(crate) mod many;
+mod streams;
+
+pub use streams::{Stream, VesselRng};

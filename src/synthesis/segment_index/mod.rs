@@ -1,0 +1,14 @@
+//! Which segments of a tree a box, a region or a ray meets, and which is nearest, while the tree grows and moves.
+//!
+//! In: a [`VesselTree`](crate::synthesis::tree::VesselTree). Out: a [`SegmentIndex`] that answers at any moment of a growth.
+
+mod index;
+mod region;
+pub(crate) mod round_cone;
+mod run;
+mod search;
+
+pub use index::SegmentIndex;
+pub use region::Region;
+pub(crate) use region::axes;
+pub use search::SegmentSearch;

@@ -1,0 +1,136 @@
+//! The segments of consecutive nodes, sorted along a curve, and how two such runs become one, a little at a time.
+//!
+//! In: a [`VesselTree`], or two runs. Out: a [`Run`]. All runs of an index are sorted along one curve, so that two are
+//! merged by looking at each segment once, without a sort; and a merge can stop anywhere.
+
+use crate::synthesis::segment_index::round_cone::box_around;
+use crate::synthesis::{
+    space::{morton::Curve, packed_boxes::PackedBoxes},
+    tree::{NO_PARENT, VesselTree},
+};
+use bevy_math::Vec3;
+use std::ops::Range;
+
+/// The segments of consecutive nodes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Run {
+    pub nodes: Range<u32>,
+    /// End node of each slot of `boxes`.
+    pub ends: Vec<u32>,
+    pub boxes: PackedBoxes,
+    /// Place of each slot on the curve, when it was sorted.
+    keys: Vec<u64>,
+    /// Slot of each node and 1 more, 0 for a root, which has no segment. Memory that holds zeros is not touched before
+    /// it is written to.
+    slots: Vec<u32>,
+    /// How this run and the next become one.
+    pub merge: Option<Box<Merge>>,
+}
+
+/// The middle of the segment that ends in a node; `None` for a root.
+fn middle(tree: &VesselTree, node: u32) -> Option<Vec3> {
+    let parent = tree.parents()[node as usize];
+    (parent != NO_PARENT).then(|| tree.positions()[node as usize].midpoint(tree.positions()[parent as usize]))
+}
+
+/// A curve through the segments of some nodes, with room around for those that grow later.
+pub(super) fn curve_through(tree: &VesselTree, nodes: Range<u32>) -> Curve {
+    /// How much wider the curve's box is than that of the segments.
+    const ROOM: f32 = 8.0;
+    Curve::around(nodes.filter_map(|node| middle(tree, node)), ROOM)
+}
+
+pub(super) fn box_of(tree: &VesselTree, node: u32) -> (Vec3, Vec3) {
+    box_around(tree, node).expect("roots have no slot")
+}
+
+impl Run {
+    pub fn new(tree: &VesselTree, nodes: Range<u32>, curve: &Curve) -> Self {
+        let place = |node: u32| middle(tree, node).map(|middle| (curve.key(middle), node));
+        let mut places: Vec<(u64, u32)> = nodes.clone().filter_map(place).collect();
+        places.sort_unstable();
+        let (keys, ends): (Vec<u64>, Vec<u32>) = places.into_iter().unzip();
+        let mut slots = vec![0; nodes.len()];
+        for (slot, &node) in (1..).zip(&ends) {
+            slots[(node - nodes.start) as usize] = slot;
+        }
+        let boxes = PackedBoxes::new(ends.len(), |slot| box_of(tree, ends[slot]));
+        Self { nodes, ends, boxes, keys, slots, merge: None }
+    }
+
+    fn slot(&self, node: u32) -> Option<usize> {
+        self.slots[(node - self.nodes.start) as usize].checked_sub(1).map(|slot| slot as usize)
+    }
+
+    /// Measures the box of one segment anew.
+    pub fn refit_node(&mut self, tree: &VesselTree, node: u32) {
+        if let Some(slot) = self.slot(node) {
+            self.boxes.set(slot, box_of(tree, node));
+        }
+    }
+
+    /// Bytes on the heap.
+    pub fn bytes(&self) -> usize {
+        let lists = 4 * (self.ends.capacity() + self.slots.capacity()) + 8 * self.keys.capacity();
+        let merge = self.merge.as_ref().map_or(0, |merge| size_of::<Merge>() + merge.run.bytes());
+        size_of::<Self>() + lists + self.boxes.bytes() + merge
+    }
+
+    /// Begins to merge the run with the next one.
+    pub fn begin_merge(&mut self, next: &Self) {
+        let len = self.ends.len() + next.ends.len();
+        let run = Self {
+            nodes: self.nodes.start..next.nodes.end,
+            ends: Vec::with_capacity(len),
+            boxes: PackedBoxes::reserve(len),
+            keys: Vec::with_capacity(len),
+            slots: vec![0; self.nodes.len() + next.nodes.len()],
+            merge: None,
+        };
+        self.merge = Some(Box::new(Merge { taken: [0; 2], raised: 0, run }));
+    }
+}
+
+/// Two runs on their way to become one. They are whole until then, and answer.
+#[derive(Clone, Debug)]
+pub(super) struct Merge {
+    /// Slots taken from each of the two.
+    taken: [usize; 2],
+    /// Packs that the packs above have taken in.
+    raised: usize,
+    /// What has been merged.
+    run: Run,
+}
+
+impl Merge {
+    /// Takes up to so many more steps: one for each segment and each pack. Returns the run once it is whole.
+    pub fn advance(&mut self, runs: [&Run; 2], mut steps: usize) -> Option<Run> {
+        let Self { taken, raised, run } = self;
+        let [first, second] = runs;
+        while steps > 0 && taken[0] + taken[1] < first.ends.len() + second.ends.len() {
+            // Of equal keys the lower node comes first, as in a run that is sorted at once.
+            let takes_first = match (first.keys.get(taken[0]), second.keys.get(taken[1])) {
+                (Some(a), Some(b)) => a <= b,
+                (a, _) => a.is_some(),
+            };
+            let side = usize::from(!takes_first);
+            let (from, slot) = (runs[side], taken[side]);
+            run.ends.push(from.ends[slot]);
+            run.keys.push(from.keys[slot]);
+            run.slots[(from.ends[slot] - run.nodes.start) as usize] = run.ends.len() as u32;
+            run.boxes.push(run.ends.len() - 1, from.boxes.get(slot));
+            taken[side] += 1;
+            steps -= 1;
+        }
+        while steps > 0 && run.boxes.raise(*raised) {
+            *raised += 1;
+            steps -= 1;
+        }
+        (steps > 0).then(|| std::mem::take(run))
+    }
+
+    /// Measures the box of one segment anew, if it has been taken.
+    pub fn refit_node(&mut self, tree: &VesselTree, node: u32) {
+        self.run.refit_node(tree, node);
+    }
+}

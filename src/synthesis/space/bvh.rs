@@ -1,0 +1,289 @@
+//! A bounding volume hierarchy: the index behind every question of "what is near this point" or "along this line".
+//!
+//! [`BoxTree`] knows only boxes; what is in them is the caller's. It is built once by binned surface-area splits (Wald,
+//! "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007) into one flat array in depth-first order, and
+//! asked without allocating.
+
+use bevy_math::{BVec3A, Vec3, Vec3A};
+
+/// Candidate planes per split, plus one.
+const BINS: usize = 16;
+/// Most boxes in a leaf.
+const LEAF: usize = 4;
+/// Depth from which on boxes are halved by number, so that depth stays below [`STACK`] whatever their shape.
+const DEEP: u32 = 48;
+/// Room for the nodes still to be visited: [`DEEP`] levels and 2³² boxes halved by number.
+const STACK: usize = 96;
+/// Factor that takes a few roundings off the square of a length.
+const SHORTENED: f32 = 1.0 - 4.0 * f32::EPSILON;
+
+/// An axis-aligned box, in the coordinates of the tissue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Lowest corner.
+    pub min: Vec3A,
+    /// Highest corner.
+    pub max: Vec3A,
+}
+
+impl Bounds {
+    /// A box around nothing, which any point enlarges.
+    pub const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
+
+    /// The smallest box around some points.
+    pub fn around(points: &[Vec3]) -> Self {
+        points.iter().fold(Self::EMPTY, |bounds, &point| bounds.with_point(point.into()))
+    }
+
+    fn with_point(self, point: Vec3A) -> Self {
+        Self { min: self.min.min(point), max: self.max.max(point) }
+    }
+
+    pub(crate) fn with(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// Half the surface area; 0 for an empty box.
+    fn half_area(self) -> f32 {
+        let size = (self.max - self.min).max(Vec3A::ZERO);
+        size.x * size.y + size.y * size.z + size.z * size.x
+    }
+
+    /// Squared distance to a point, 0 inside; never above that of any point of the box, whatever the rounding.
+    pub(crate) fn distance_squared(&self, point: Vec3A) -> f32 {
+        let outside = (self.min - point).max(point - self.max).max(Vec3A::ZERO);
+        outside.length_squared() * SHORTENED
+    }
+
+    /// Whether two boxes have a point in common.
+    fn overlaps(&self, other: &Self) -> bool {
+        self.min.cmple(other.max).all() && self.max.cmpge(other.min).all()
+    }
+
+    /// Where a line enters the box, at or after 0, if it does so before `limit`. `inverse` is 1 / direction.
+    fn entry(&self, from: Vec3A, inverse: Vec3A, limit: f32) -> Option<f32> {
+        let (a, b) = ((self.min - from) * inverse, (self.max - from) * inverse);
+        // A line within a face gives 0 · ∞, not a number: count it as in.
+        let within: BVec3A = a.is_nan_mask() | b.is_nan_mask();
+        let near = Vec3A::select(within, Vec3A::NEG_INFINITY, a.min(b));
+        let far = Vec3A::select(within, Vec3A::INFINITY, a.max(b));
+        let (enter, leave) = (near.max_element().max(0.0), far.min_element());
+        (enter <= leave && enter <= limit).then_some(enter)
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: Bounds,
+    /// Of a leaf: its first slot. Of an inner node: its second child; the first child follows the node.
+    link: u32,
+    /// Number of boxes in a leaf, 0 for an inner node.
+    count: u32,
+}
+
+/// The hierarchy over a list of boxes.
+///
+/// A box is known by its slot, its place in [`order`](Self::order). Callers keep their own data in that order, so that
+/// what is asked for together lies together.
+#[derive(Clone, Debug, Default)]
+pub struct BoxTree {
+    nodes: Vec<Node>,
+    order: Vec<u32>,
+}
+
+/// A box while the tree is built.
+#[derive(Clone, Copy)]
+struct Item {
+    bounds: Bounds,
+    id: u32,
+    /// Where it falls in the split under way.
+    bin: u32,
+}
+
+impl Item {
+    /// Twice the centre.
+    fn centre(&self) -> Vec3A {
+        self.bounds.min + self.bounds.max
+    }
+}
+
+impl BoxTree {
+    /// Builds the tree over boxes, which may overlap, be flat or coincide.
+    pub fn new(boxes: impl IntoIterator<Item = Bounds>) -> Self {
+        let mut items: Vec<Item> =
+            boxes.into_iter().enumerate().map(|(id, bounds)| Item { bounds, id: id as u32, bin: 0 }).collect();
+        let mut nodes: Vec<Node> = Vec::with_capacity(items.len());
+        // Ranges still to be made into nodes, with the node whose second child they are.
+        let mut pending = Vec::new();
+        if !items.is_empty() {
+            pending.push((0, items.len(), None::<usize>, 0u32));
+        }
+        while let Some((start, end, parent, depth)) = pending.pop() {
+            let index = nodes.len();
+            if let Some(parent) = parent {
+                nodes[parent].link = index as u32;
+            }
+            let range = &mut items[start..end];
+            let (mut bounds, mut centres) = (Bounds::EMPTY, Bounds::EMPTY);
+            for item in range.iter() {
+                bounds = bounds.with(item.bounds);
+                centres = centres.with_point(item.centre());
+            }
+            if range.len() <= LEAF {
+                nodes.push(Node { bounds, link: start as u32, count: range.len() as u32 });
+                continue;
+            }
+            nodes.push(Node { bounds, link: 0, count: 0 });
+            let middle = start + split(range, &centres, depth);
+            pending.push((middle, end, Some(index), depth + 1));
+            pending.push((start, middle, None, depth + 1));
+        }
+        Self { nodes, order: items.iter().map(|item| item.id).collect() }
+    }
+
+    /// For every slot the number of its box in the list that the tree was built from.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Visits boxes nearest to a point first, as long as they can be nearer than what was found.
+    ///
+    /// `visit(slot, best)` measures what is in the box and returns the squared distance of the best so far. The search
+    /// begins with `limit`. A box exactly as far as the best is still visited, so that ties can be broken by the caller.
+    #[inline]
+    pub fn nearest(&self, point: Vec3, limit: f32, mut visit: impl FnMut(usize, f32) -> f32) {
+        let point = Vec3A::from(point);
+        let mut best = limit;
+        let mut stack = [(0u32, 0f32); STACK];
+        let mut depth = 0;
+        let mut next = self.nodes.first().map(|root| (0, root.bounds.distance_squared(point)));
+        while let Some((index, distance)) = next {
+            if distance <= best {
+                let node = &self.nodes[index as usize];
+                if node.count == 0 {
+                    let (near, far) = (index + 1, node.link);
+                    let to_near = self.nodes[near as usize].bounds.distance_squared(point);
+                    let to_far = self.nodes[far as usize].bounds.distance_squared(point);
+                    let (first, second) = if to_near <= to_far {
+                        ((near, to_near), (far, to_far))
+                    } else {
+                        ((far, to_far), (near, to_near))
+                    };
+                    if second.1 <= best {
+                        stack[depth] = second;
+                        depth += 1;
+                    }
+                    next = Some(first);
+                    continue;
+                }
+                for slot in node.link..node.link + node.count {
+                    best = visit(slot as usize, best);
+                }
+            }
+            next = depth.checked_sub(1).map(|top| {
+                depth = top;
+                stack[top]
+            });
+        }
+    }
+
+    /// Visits every box that has a point in common with `region`, until `visit` returns false.
+    pub fn overlapping(&self, region: &Bounds, visit: impl FnMut(usize) -> bool) {
+        self.walk(|bounds| bounds.overlaps(region), visit);
+    }
+
+    /// Visits boxes along the segment between two points, as long as they can be met before what was found.
+    ///
+    /// `visit(slot, limit)` returns the share of the segment, 0 to 1, up to which the search goes on.
+    pub fn along(&self, from: Vec3, to: Vec3, mut visit: impl FnMut(usize, f32) -> f32) {
+        let from = Vec3A::from(from);
+        let inverse = (Vec3A::from(to) - from).recip();
+        let limit = std::cell::Cell::new(1.0);
+        self.walk(
+            |bounds| bounds.entry(from, inverse, limit.get()).is_some(),
+            |slot| {
+                limit.set(visit(slot, limit.get()));
+                true
+            },
+        );
+    }
+
+    /// Depth-first walk through the nodes whose box `enters` lets through, until `visit` returns false.
+    fn walk(&self, enters: impl Fn(&Bounds) -> bool, mut visit: impl FnMut(usize) -> bool) {
+        let mut stack = [0u32; STACK];
+        let mut depth = usize::from(!self.nodes.is_empty());
+        while depth > 0 {
+            depth -= 1;
+            let index = stack[depth];
+            let node = &self.nodes[index as usize];
+            if !enters(&node.bounds) {
+                continue;
+            }
+            if node.count == 0 {
+                stack[depth] = node.link;
+                stack[depth + 1] = index + 1;
+                depth += 2;
+                continue;
+            }
+            for slot in node.link..node.link + node.count {
+                if !visit(slot as usize) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// Sorts items to two sides of a plane and says how many are on the first: at least one, and not all. `centres` bounds
+/// their centres, doubled.
+fn split(items: &mut [Item], centres: &Bounds, depth: u32) -> usize {
+    let size = centres.max - centres.min;
+    let axis = size.max_position();
+    let half = items.len() / 2;
+    // Centres that coincide can only be told apart by number; so can those of degenerate extents.
+    let apart = size[axis] > 0.0;
+    if depth >= DEEP || !apart {
+        items.select_nth_unstable_by(half, |a, b| a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.id.cmp(&b.id)));
+        return half;
+    }
+    let scale = BINS as f32 / size[axis];
+    let mut bins = [(Bounds::EMPTY, 0u32); BINS];
+    for item in items.iter_mut() {
+        item.bin = (((item.centre()[axis] - centres.min[axis]) * scale) as u32).min(BINS as u32 - 1);
+        let (bounds, count) = &mut bins[item.bin as usize];
+        *bounds = bounds.with(item.bounds);
+        *count += 1;
+    }
+    let plane = cheapest_plane(&bins);
+    let mut middle = 0;
+    for i in 0..items.len() {
+        if items[i].bin < plane {
+            items.swap(i, middle);
+            middle += 1;
+        }
+    }
+    // The first and the last bin hold the outermost centres, so neither side is empty unless rounding has its way.
+    if middle == 0 || middle == items.len() { half } else { middle }
+}
+
+/// The bin before which to split so that area times number, over both sides, is least.
+fn cheapest_plane(bins: &[(Bounds, u32); BINS]) -> u32 {
+    let mut left = [0.0; BINS];
+    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+    for plane in 1..BINS {
+        bounds = bounds.with(bins[plane - 1].0);
+        count += bins[plane - 1].1;
+        left[plane] = bounds.half_area() * count as f32;
+    }
+    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+    let mut best = (f32::INFINITY, BINS / 2);
+    for plane in (1..BINS).rev() {
+        bounds = bounds.with(bins[plane].0);
+        count += bins[plane].1;
+        let cost = left[plane] + bounds.half_area() * count as f32;
+        if cost < best.0 {
+            best = (cost, plane);
+        }
+    }
+    best.1 as u32
+}

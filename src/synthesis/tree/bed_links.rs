@@ -1,0 +1,13 @@
+//! Where blood comes over from an artery to a vein.
+
+use super::NodeId;
+
+/// A stretch of capillary bed between an artery and a vein.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub struct BedLink {
+    /// The node that gives blood.
+    pub arterial: NodeId,
+    /// The node that takes it.
+    pub venous: NodeId,
+}
