@@ -5,7 +5,7 @@ use crate::synthesis::{
     wound::{Blade, BladeError, ClampId, WoundError, WoundReport},
 };
 use bevy::{
-    ecs::{entity::Entity, message::Message},
+    ecs::{entity::Entity, event::EntityEvent, message::Message},
     math::Vec3,
 };
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -149,11 +149,12 @@ pub enum OperationKind {
 /// Something was done to the vessels of one vessel entity. An action that changes several, in several organs or in arteries
 /// and veins, gives one of these for each.
 ///
-/// Entities for the ends that it opened are there from the same frame on: see
+/// Also an event on the organ, for observers. When it is told, entities for the ends that it opened are there: see
 /// [`OpenEndEntities`](crate::plugin::OpenEndEntities).
-#[derive(Message, Clone, Debug, PartialEq)]
+#[derive(Message, EntityEvent, Clone, Debug, PartialEq)]
 pub struct VesselOperation {
     /// The organ.
+    #[event_target]
     pub organ: Entity,
     /// The vessel entity.
     pub vessels: Entity,
