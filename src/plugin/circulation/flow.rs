@@ -17,11 +17,7 @@ use crate::plugin::{
     },
     growth::{progress::GrowthProgress, state::GrowthState},
     surgery::open_ends::{OpenEnd, OpenEndEntities},
-    vessels::{
-        relations::OrganVessels,
-        tree::{Lineage, Vessels},
-        wounds::VesselWounds,
-    },
+    vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
 };
 use crate::synthesis::{
     haemodynamics::{Bleeding, EndState, FlowError},

@@ -8,7 +8,7 @@ use crate::plugin::{
         vasculature::Vasculature,
     },
     organ::mesh::OrganMeshError,
-    vessels::tree::Lineage,
+    vessels::lineage::Lineage,
 };
 use crate::synthesis::{
     growth::{GrownTree, Growth, GrowthWarning, TreeUpdate},

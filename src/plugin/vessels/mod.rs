@@ -11,14 +11,17 @@ use bevy::{
 
 pub(crate) mod appearance;
 pub(crate) mod change_log;
+pub(crate) mod changes;
 pub(crate) mod index;
+pub(crate) mod lineage;
 pub(crate) mod pick;
 pub(crate) mod relations;
 pub(crate) mod tree;
 pub(crate) mod wounds;
 
 pub use appearance::{SegmentColoring, VesselAppearance};
-pub use change_log::SegmentChanges;
+pub use change_log::{ChangeCursor, ChangeLog};
+pub use changes::Changes;
 pub use index::VesselIndex;
 pub use pick::{VesselPicker, VesselPlace};
 pub use relations::{OrganVessels, VesselsOf};
@@ -57,10 +60,11 @@ impl Default for VesselsPlugin {
 impl Plugin for VesselsPlugin {
     fn build(&self, app: &mut App) {
         order::configure(app, self.schedule);
+        app.register_required_components::<Vessels, VesselIndex>();
         app.add_systems(
             self.schedule,
             (
-                appearance::show_kinds.in_set(VesselSystems::Publish),
+                (appearance::show_kinds, tree::mark_replaced).in_set(VesselSystems::Publish),
                 index::index_vessels.after(VesselSystems::Follow).before(VesselSystems::Cut),
             ),
         );
