@@ -31,7 +31,7 @@ fn another_seed_or_setting_restarts_at_the_next_frame_on_the_same_tissue() {
     assert_ne!(before, trees(app.world(), organ));
     change(&mut app, organ, |wish| {
         wish.seed = 0;
-        wish.settings.arterial.step_length *= 0.9;
+        settings_of(wish).arterial.step_length *= 0.9;
     });
     app.update();
     assert_eq!(progress(app.world(), organ).step, 2);
@@ -144,9 +144,10 @@ fn segment_changes_are_exactly_what_a_copy_needs() {
 fn assert_changes_exact(steps: u32) {
     let mut app = headless(GrowthBudget::Steps(steps));
     let mut wish = quick();
-    wish.settings = wish.settings.scaled(0.6);
-    wish.settings.steps = 150;
-    wish.settings.samples = 4000;
+    wish.generator = wish.generator.scaled(0.6);
+    let settings = settings_of(&mut wish);
+    settings.steps = 150;
+    settings.samples = 4000;
     let organ = spawn(&mut app, wish);
     let mut copy: Vec<[f32; 8]> = Vec::new();
     run_until(&mut app, "the end", |world| {
@@ -168,7 +169,7 @@ fn assert_changes_exact(steps: u32) {
     });
     assert!(copy.len() > 2500, "{} segments are too few to tell", copy.len());
     app.update();
-    let entity = vessel_entity(app.world(), organ, VesselKind::Artery).expect("the system has vessels");
+    let entity = vessel_entity(app.world(), organ, VesselKind::Artery).expect("the kind has vessels");
     assert!(app.world().get::<SegmentChanges>(entity).is_some_and(SegmentChanges::is_empty), "all is at rest");
 }
 
