@@ -4,10 +4,7 @@ use crate::operating_field::*;
 use crate::*;
 use bevy_vessels::{
     plugin::{ChangeCursor, ChangeLog, Changes, Cuttable, GrowthStarted, VesselsOf},
-    synthesis::{
-        tissue::Tissue,
-        tree::NodeId,
-    },
+    synthesis::tissue::Tissue,
 };
 use std::ptr;
 
@@ -35,7 +32,7 @@ fn another_seed_or_setting_restarts_at_the_next_frame_on_the_same_tissue() {
     assert_ne!(before, trees(app.world(), organ));
     change(&mut app, organ, |wish| {
         wish.seed = 0;
-        wish.settings.arterial.step_length *= 0.9;
+        settings_of(wish).arterial.step_length *= 0.9;
     });
     app.update();
     assert_eq!(progress(app.world(), organ).step, 2);
@@ -170,9 +167,10 @@ fn each_reader_gets_exactly_what_its_copy_needs() {
 fn assert_changes_exact(steps: u32) {
     let mut app = headless(GrowthBudget::Steps(steps));
     let mut wish = quick();
-    wish.settings = wish.settings.scaled(0.6);
-    wish.settings.steps = 150;
-    wish.settings.samples = 4000;
+    wish.generator = wish.generator.scaled(0.6);
+    let settings = settings_of(&mut wish);
+    settings.steps = 150;
+    settings.samples = 4000;
     let organ = spawn(&mut app, wish);
     let mut readers = [1, 2, 5].map(|period| Copier { period, ..Copier::default() });
     let mut frame = 0;
@@ -236,7 +234,7 @@ fn other_vessels_are_changed_throughout() {
 #[test]
 fn vessels_updated_by_hand_mark_what_differs() {
     let mut app = headless(GrowthBudget::default());
-    let mut tree = tube(1.0, 0.1, 100);
+    let tree = tube(1.0, 0.1, 100);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
     let entity = vessel_entity(app.world(), organ, VesselKind::Artery).expect("the organ has an artery");
     cut(&mut app, square(Vec3::X * 0.205, Vec3::X, 1.0));
@@ -252,11 +250,15 @@ fn vessels_updated_by_hand_mark_what_differs() {
     };
     let is_cut = |app: &App| !wounds(app.world(), organ, VesselKind::Artery).is_empty();
     assert!(update(&mut app, &tree).is_empty());
-    tree.positions_mut()[40] += Vec3::Y * 0.001;
-    tree.radii_mut()[70] *= 0.5;
-    let end = tree.push_child(NodeId(100), Vec3::X * 1.01, 0.1).index();
-    let changes = update(&mut app, &tree);
-    assert_eq!(changes.dirty_nodes(0..tree.len()).collect::<Vec<_>>(), [40, 41, 70, 71, end]);
+    let grown = edited(&tree, |positions, parents, radii| {
+        positions[40].y += 0.001;
+        radii[70] *= 0.5;
+        positions.push(Vec3::X * 1.01);
+        parents.push(100);
+        radii.push(0.1);
+    });
+    let changes = update(&mut app, &grown);
+    assert_eq!(changes.dirty_nodes(0..grown.len()).collect::<Vec<_>>(), [40, 41, 70, 71, 101]);
     assert!(is_cut(&app), "they are the same vessels");
     let shorter = tube(1.0, 0.1, 50);
     assert!(update(&mut app, &shorter).is_all());
