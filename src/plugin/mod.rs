@@ -18,6 +18,7 @@
 //! | [`CirculationPlugin`] | `circulation` | [`VesselWounds`] → flow, bleeding, supply of the tissue |
 //! | [`VesselsPlugin`] | `vessels` | what all of them need; they add it themselves |
 
+mod announcer;
 mod circulation;
 mod deformation;
 mod growth;

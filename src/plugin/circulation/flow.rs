@@ -6,6 +6,7 @@
 
 use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::plugin::{
+    announcer::Announcer,
     circulation::{
         bleeding::BleedingMessages,
         messages::{BleedingStopped, CirculationFailed},
@@ -29,7 +30,6 @@ use bevy::{
         entity::Entity,
         hierarchy::ChildOf,
         lifecycle::Remove,
-        message::MessageWriter,
         observer::On,
         query::{QueryData, With},
         system::{Commands, Query},
@@ -230,7 +230,7 @@ impl PerfusedOrganItem<'_, '_> {
             let ends = self.state.bleeding[kind].ends().iter().zip(&self.state.ends[kind]);
             for (_, end) in ends.filter(|(flowing, _)| flowing.state == EndState::Bleeding) {
                 let (organ, vessels) = (self.entity, found.entity);
-                messages.stopped.write(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity: None });
+                messages.stopped.announce(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity: None });
             }
         }
         let settings = *self.state.bleeding.artery.settings();
@@ -252,7 +252,7 @@ impl PerfusedOrganItem<'_, '_> {
         Ok(())
     }
 
-    fn accept(&mut self, made: Result<OrganFlow, FlowError>, failed: &mut MessageWriter<CirculationFailed>) {
+    fn accept(&mut self, made: Result<OrganFlow, FlowError>, failed: &mut Announcer<CirculationFailed>) {
         let is_grown = self.state.made_for.is_some_and(|made_for| made_for.is_grown);
         if let Err(error) = made.and_then(|flow| self.state.take(flow, is_grown)) {
             self.fail(error, failed);
@@ -260,7 +260,7 @@ impl PerfusedOrganItem<'_, '_> {
     }
 
     /// The blood stands still until something changes.
-    pub(crate) fn fail(&mut self, error: FlowError, failed: &mut MessageWriter<CirculationFailed>) {
+    pub(crate) fn fail(&mut self, error: FlowError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
         warn!("{organ}: its blood stands still: {error}");
         self.state.task = None;
@@ -268,7 +268,7 @@ impl PerfusedOrganItem<'_, '_> {
         self.state.ends.values_mut().for_each(Vec::clear);
         self.state.error = Some(error.clone());
         *self.loss = BloodLoss { total: self.loss.total, ..BloodLoss::default() };
-        failed.write(CirculationFailed { organ, error });
+        failed.announce(CirculationFailed { organ, error });
     }
 }
 

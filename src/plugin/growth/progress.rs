@@ -71,7 +71,7 @@ impl GrowthProgress {
 
 /// Whether an organ's growth goes on by itself. Set it at will, or send a
 /// [`GrowthCommand`](crate::plugin::GrowthCommand).
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub enum GrowthControl {
     /// Steps follow one another as the budget allows.

@@ -5,6 +5,7 @@
 //! uses its buffers again. Where many growths start at once, the budget spreads them over frames.
 
 use crate::plugin::{
+    announcer::Announcer,
     growth::{
         budget::{GrowthBudget, GrowthFrame, LastCosts, begin_after},
         messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganGrowthError},
@@ -26,7 +27,7 @@ use bevy::{
     ecs::{
         change_detection::{DetectChanges, DetectChangesMut, Ref, Res, ResMut},
         entity::Entity,
-        message::{MessageReader, MessageWriter},
+        message::MessageReader,
         query::QueryData,
         system::{Local, Query, SystemParam},
     },
@@ -58,9 +59,9 @@ pub(crate) struct OrganMeshes<'w> {
 
 /// Where a growth reports how it starts.
 #[derive(SystemParam)]
-pub(crate) struct StartMessages<'w> {
-    started: MessageWriter<'w, GrowthStarted>,
-    failed: MessageWriter<'w, GrowthFailed>,
+pub(crate) struct StartMessages<'w, 's> {
+    started: Announcer<'w, 's, GrowthStarted>,
+    failed: Announcer<'w, 's, GrowthFailed>,
 }
 
 /// Does what the commands of this frame say.
@@ -237,15 +238,13 @@ impl OrganItem<'_, '_> {
     pub(crate) fn report(&mut self, outcome: Result<Started, OrganGrowthError>, messages: &mut StartMessages) {
         let organ = self.entity;
         match outcome {
-            Ok(true) => {
-                messages.started.write(GrowthStarted { organ });
-            }
+            Ok(true) => messages.started.announce(GrowthStarted { organ }),
             Ok(false) => {}
             Err(error) => {
                 warn!("{organ}: no vessels grow here: {error}");
                 self.state.fail(error.clone());
                 self.enter(GrowthPhase::Failed);
-                messages.failed.write(GrowthFailed { organ, error });
+                messages.failed.announce(GrowthFailed { organ, error });
             }
         }
     }

@@ -37,7 +37,8 @@ use bevy::{
 /// # use bevy_vessels::{plugin::{Cuttable, Vasculature}, synthesis::preset::PresetName};
 /// let organ = (Vasculature::new(PresetName::Colon), Cuttable::default());
 /// ```
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Cuttable {
     /// How far the ends of later cuts draw back, so that a gap is seen.

@@ -209,7 +209,7 @@ impl Vessels {
     fn append(&mut self, grown: &GrownTree, node: usize) {
         let GrownTree { tree, birth_steps, .. } = grown;
         let position = grown.lifted_position(NodeId(node as u32));
-        self.push(position, tree.parents()[node], tree.radii()[node], birth_steps[node]);
+        self.push(position, tree.parents()[node], tree.radii()[node], birth_steps.get(node).copied().unwrap_or(0));
     }
 
     fn push(&mut self, position: Vec3, parent: u32, radius: f32, birth_step: u32) {
