@@ -22,6 +22,7 @@ mod announcer;
 mod circulation;
 mod deformation;
 mod growth;
+mod job;
 mod order;
 mod organ;
 mod surgery;
@@ -37,6 +38,7 @@ pub use growth::{
     GrowthFrame, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthStarted, GrowthState, OrganGrowthError, Vasculature,
     diagnostics,
 };
+pub use job::{JobMode, JobSettings};
 pub use order::VesselSystems;
 pub use organ::{OrganMeshError, RestMesh, triangle_mesh};
 pub use surgery::{

@@ -4,7 +4,6 @@
 //! made within a frame, those of large ones in the task pool. Given the same vessels, actions and time steps, the same is
 //! lost to the last bit, as long as no network is on its way.
 
-use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::plugin::{
     announcer::Announcer,
     circulation::{
@@ -19,6 +18,7 @@ use crate::plugin::{
     surgery::open_ends::{OpenEnd, OpenEndEntities},
     vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
 };
+use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::synthesis::{
     haemodynamics::{Bleeding, EndState, FlowError},
     tree::{BedLink, ByKind, VesselKind},
@@ -230,7 +230,13 @@ impl PerfusedOrganItem<'_, '_> {
             let ends = self.state.bleeding[kind].ends().iter().zip(&self.state.ends[kind]);
             for (_, end) in ends.filter(|(flowing, _)| flowing.state == EndState::Bleeding) {
                 let (organ, vessels) = (self.entity, found.entity);
-                messages.stopped.announce(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity: None });
+                messages.stopped.announce(BleedingStopped {
+                    organ,
+                    vessels,
+                    end: end.id,
+                    side: end.side,
+                    entity: None,
+                });
             }
         }
         let settings = *self.state.bleeding.artery.settings();
