@@ -114,6 +114,11 @@ impl Pace {
         }
     }
 
+    /// Does something with each of so many items in order, light ones, and rests in between.
+    pub(crate) async fn each(&self, items: usize, mut act: impl FnMut(usize)) {
+        self.stretches(items, STRETCH, |stretch| stretch.for_each(&mut act)).await;
+    }
+
     /// Makes a list of so many items, light ones.
     pub(crate) async fn collect<T>(&self, items: usize, item: impl Fn(usize) -> T) -> Vec<T> {
         let mut list = Vec::with_capacity(items);

@@ -5,6 +5,7 @@
 //! slot has one above it, and no loop asks whether a node is a root or cut off.
 
 use super::{FlowError, FlowSettings, Interruption, open_ends::OpenEnds};
+use crate::synthesis::pace::{Pace, at_once};
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use crate::synthesis::units::Pressure;
 
@@ -120,6 +121,14 @@ impl Network {
     /// # Errors
     /// When the tree is not well formed, or a setting is outside its limits.
     pub fn new(tree: &VesselTree, settings: FlowSettings) -> Result<Self, FlowError> {
+        at_once(Self::new_paced(tree, settings, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub async fn new_paced(tree: &VesselTree, settings: FlowSettings, pace: &Pace) -> Result<Self, FlowError> {
         settings.validate()?;
         tree.validate()?;
         let mut network = Self {
@@ -144,7 +153,7 @@ impl Network {
         };
         network.clear();
         network.set_root_pressure(network.settings.root.mean())?;
-        network.append(tree);
+        network.append(tree, pace).await;
         Ok(network)
     }
 
@@ -159,7 +168,7 @@ impl Network {
             && (0..before).all(|node| slot_of(tree.parents()[node]) == self.links[node + FIRST].parent);
         if !goes_on {
             self.clear();
-            self.append(tree);
+            at_once(self.append(tree, &Pace::default()));
             return Ok(NetworkUpdate { appended: tree.len(), changed: 0, replaced: true });
         }
         let mut changed = 0;
@@ -175,7 +184,7 @@ impl Network {
                 changed += 1;
             }
         }
-        self.append(tree);
+        at_once(self.append(tree, &Pace::default()));
         let appended = tree.len() - before;
         if changed + appended > 0 {
             self.sums_stale = true;
@@ -204,9 +213,10 @@ impl Network {
     }
 
     /// Takes over the nodes that the tree has more.
-    fn append(&mut self, tree: &VesselTree) {
+    async fn append(&mut self, tree: &VesselTree, pace: &Pace) {
         let before = self.len();
-        for node in before..tree.len() {
+        let add = |number: usize| {
+            let node = before + number;
             let (slot, parent) = (node + FIRST, slot_of(tree.parents()[node]));
             let next_sibling = std::mem::replace(&mut self.links[parent as usize].first_child, slot as u32);
             self.links.push(Link { upstream: parent, parent, first_child: REFERENCE, next_sibling });
@@ -218,14 +228,17 @@ impl Network {
             let length = self.length_in(tree, node);
             self.lengths.push(length);
             self.set_radius(node, tree.radii()[node]);
-        }
+        };
+        pace.part(0.0..0.8).each(tree.len() - before, add).await;
         // After all links, which say what is a terminal and no longer is one.
-        for node in before..tree.len() {
+        let measure = |number: usize| {
+            let node = before + number;
             self.set_resistance(node);
             if let Some(parent) = (self.links[node + FIRST].parent as usize).checked_sub(FIRST) {
                 self.set_bed(parent);
             }
-        }
+        };
+        pace.part(0.8..1.0).each(tree.len() - before, measure).await;
         self.pressures.resize(tree.len(), 0.0);
         self.flows.resize(tree.len(), 0.0);
         self.sums_stale = true;

@@ -3,19 +3,22 @@
 //! In: positions and indices as a file or an engine's mesh holds them. Out: a [`TriangleMesh`] that every later stage can
 //! work with, its [`topology`], an index of its triangles ([`TriangleIndex`]) and its voxels.
 
+pub(crate) mod bit_grid;
 mod shaded;
 pub(crate) mod tet_mesh;
 pub mod topology;
 pub mod triangle_index;
 mod triangle_mesh;
 pub(crate) mod voxels;
+mod welding;
 pub(crate) mod winding;
 
 pub use shaded::ShadedMesh;
 pub use tet_mesh::{TetMesh, TetMeshError};
-pub use topology::{MeshTopology, Welding};
+pub use topology::MeshTopology;
 pub use triangle_index::{SurfacePoint, TriangleIndex};
 pub use triangle_mesh::{MAX_COORDINATE, MAX_TRIANGLES, MeshError, TriangleMesh};
+pub use welding::Welding;
 
 pub use voxels::VoxelError;
 

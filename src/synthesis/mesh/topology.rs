@@ -1,36 +1,14 @@
 //! How the triangles of a mesh hang together once vertices at the same position count as one.
 
 use super::{
-    TriangleMesh,
+    TriangleMesh, Welding,
     triangle_mesh::{doubled_normal, is_degenerate},
 };
-use bevy_math::Vec3;
+use crate::synthesis::pace::{Pace, Stretch, at_once};
 use std::collections::VecDeque;
 
-/// Which vertices of a mesh are at the same position.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Welding {
-    vertices: Vec<u32>,
-    count: usize,
-}
-
-impl Welding {
-    /// The welded vertex that a vertex of the mesh belongs to. Welded vertices are numbered in order of appearance.
-    ///
-    /// # Panics
-    /// When the mesh has no such vertex.
-    pub fn vertex(&self, vertex: u32) -> usize {
-        self.vertices[vertex as usize] as usize
-    }
-
-    /// Number of different positions.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-}
-
-/// An edge between two welded vertices, in one of its triangles.
-#[derive(Clone, Copy, Debug)]
+/// An edge between two welded vertices, in one of its triangles. Uses of the same edge are side by side in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct EdgeUse {
     /// The lower vertex in the upper half, the higher in the lower half.
     key: u64,
@@ -50,72 +28,32 @@ pub struct MeshTopology {
     edges: Vec<EdgeUse>,
 }
 
-/// What stands in the welding table where no vertex is.
-const EMPTY: u32 = u32::MAX;
-
 impl TriangleMesh {
-    /// Finds vertices at exactly the same position (−0 and 0 are the same).
-    pub fn weld(&self) -> Welding {
-        let positions = self.positions();
-        // Open addressing over at least twice as many slots as vertices: a probe nearly always ends at once.
-        let mask = (2 * positions.len()).next_power_of_two() - 1;
-        let mut slots = vec![EMPTY; mask + 1];
-        let mut firsts: Vec<Vec3> = Vec::with_capacity(positions.len());
-        let mut vertices = Vec::with_capacity(positions.len());
-        for &position in positions {
-            let mut slot = hash(position) as usize & mask;
-            let welded = loop {
-                match slots[slot] {
-                    EMPTY => {
-                        slots[slot] = firsts.len() as u32;
-                        firsts.push(position);
-                        break slots[slot];
-                    }
-                    candidate if firsts[candidate as usize] == position => break candidate,
-                    _ => slot = (slot + 1) & mask,
-                }
-            };
-            vertices.push(welded);
-        }
-        Welding { vertices, count: firsts.len() }
-    }
-
-    /// A copy in which every position occurs once, and no triangle is degenerate or repeats an earlier one.
-    ///
-    /// Texture coordinates are dropped: a welded vertex of a seam would need several.
-    #[must_use]
-    pub fn welded(&self) -> Self {
-        let welding = self.weld();
-        let mut positions = vec![Vec3::ZERO; welding.count()];
-        for (vertex, &position) in self.positions().iter().enumerate() {
-            positions[welding.vertex(vertex as u32)] = position;
-        }
-        let triangles: Vec<[u32; 3]> = (0..self.triangles().len())
-            .filter(|&triangle| !self.is_degenerate(triangle))
-            .map(|triangle| self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32))
-            .collect();
-        Self { positions, triangles: without_repeats(triangles), uvs: None }
-    }
-
     /// The welded edges of the mesh, for every question about how it hangs together.
     pub fn topology(&self) -> MeshTopology {
-        let welding = self.weld();
+        at_once(self.topology_paced(&Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub async fn topology_paced(&self, pace: &Pace) -> MeshTopology {
+        let welding = self.weld_paced(&pace.part(0.0..0.2)).await;
         let mut edges = Vec::with_capacity(3 * self.triangles().len());
         let mut triangles = Vec::with_capacity(self.triangles().len());
-        for (triangle, corners) in self.triangles().iter().enumerate() {
+        let take = |triangle: usize| {
             if is_degenerate(self.corners(triangle)) {
                 triangles.push(None);
-                continue;
+                return;
             }
-            let corners = corners.map(|vertex| welding.vertex(vertex) as u32);
+            let corners = self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32);
             triangles.push(Some(corners));
             for side in 0..3 {
                 let (from, to) = (corners[side], corners[(side + 1) % 3]);
                 let key = u64::from(from.min(to)) << 32 | u64::from(from.max(to));
                 edges.push(EdgeUse { key, triangle: triangle as u32, forward: from < to });
             }
-        }
-        edges.sort_unstable_by_key(|edge| (edge.key, edge.triangle, edge.forward));
+        };
+        pace.part(0.2..0.3).each(self.triangles().len(), take).await;
+        pace.part(0.3..1.0).sort(&mut edges).await;
         MeshTopology { welding, triangles, edges }
     }
 
@@ -163,13 +101,23 @@ impl MeshTopology {
     ///
     /// Where there is none, every point is enclosed a whole number of times, from whichever side one looks.
     pub fn unbalanced(&self, flip: impl Fn(usize) -> bool) -> Vec<bool> {
+        at_once(self.unbalanced_paced(flip, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(crate) async fn unbalanced_paced(&self, flip: impl Fn(usize) -> bool, pace: &Pace) -> Vec<bool> {
         let mut unbalanced = vec![false; self.triangles.len()];
+        let (mut stretch, mut done) = (Stretch::default(), 0);
         for fan in self.fans() {
             let forward = fan.iter().filter(|edge| edge.forward != flip(edge.triangle as usize)).count();
             if 2 * forward != fan.len() {
                 for edge in fan {
                     unbalanced[edge.triangle as usize] = true;
                 }
+            }
+            done += fan.len();
+            if stretch.ends_after(fan.len()) {
+                pace.rest(done as f32 / self.edges.len() as f32).await;
             }
         }
         unbalanced
@@ -188,7 +136,7 @@ impl MeshTopology {
     /// Numbers the connected parts of the mesh: for every triangle the part it belongs to, `None` where it is
     /// degenerate, and how many parts there are. Triangles are connected across shared edges.
     pub fn components(&self) -> (Vec<Option<u32>>, usize) {
-        let patches = self.patches(|_| true, |_, _, _| {});
+        let patches = at_once(self.patches(|_| true, |_, _, _| {}, &Pace::default()));
         (patches.of_triangle, patches.count)
     }
 
@@ -197,16 +145,23 @@ impl MeshTopology {
     /// Orientation spreads across edges that exactly two triangles share. Of the two ways in which such a part can face,
     /// the one that most of its area already has is kept, so a mesh that is consistent stays as it is.
     pub fn misoriented(&self, mesh: &TriangleMesh) -> Vec<bool> {
+        at_once(self.misoriented_paced(mesh, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(crate) async fn misoriented_paced(&self, mesh: &TriangleMesh, pace: &Pace) -> Vec<bool> {
         let mut flip = vec![false; self.triangles.len()];
-        let patches = self.patches(|fan| fan.len() == 2, |from, to, same_way| flip[to] = flip[from] != same_way);
+        let turn = |from: usize, to: usize, same_way: bool| flip[to] = flip[from] != same_way;
+        let patches = self.patches(|fan| fan.len() == 2, turn, &pace.part(0.0..0.8)).await;
         // Area of each part that would be flipped, less the area that would stay.
         let mut balance = vec![0.0; patches.count];
-        for (triangle, patch) in patches.of_triangle.iter().enumerate() {
-            if let Some(patch) = patch {
+        let weigh = |triangle: usize| {
+            if let Some(patch) = patches.of_triangle[triangle] {
                 let area = doubled_normal(mesh.corners(triangle)).length();
-                balance[*patch as usize] += if flip[triangle] { area } else { -area };
+                balance[patch as usize] += if flip[triangle] { area } else { -area };
             }
-        }
+        };
+        pace.part(0.8..1.0).each(self.triangles.len(), weigh).await;
         for (triangle, patch) in patches.of_triangle.iter().enumerate() {
             if patch.is_some_and(|patch| balance[patch as usize] > 0.0) {
                 flip[triangle] = !flip[triangle];
@@ -216,8 +171,8 @@ impl MeshTopology {
     }
 
     /// Parts of the surface joined by edges with exactly two triangles, and whether each part is closed.
-    pub(crate) fn manifold_patches(&self) -> (Patches, Vec<bool>) {
-        let patches = self.patches(|fan| fan.len() == 2, |_, _, _| {});
+    pub(crate) async fn manifold_patches(&self, pace: &Pace) -> (Patches, Vec<bool>) {
+        let patches = self.patches(|fan| fan.len() == 2, |_, _, _| {}, pace).await;
         let mut closed = vec![true; patches.count];
         for edge in self.fans().filter(|fan| fan.len() == 1).flatten() {
             if let Some(patch) = patches.of_triangle[edge.triangle as usize] {
@@ -236,20 +191,15 @@ impl MeshTopology {
     ///
     /// `visit(from, to, same_way)` is told of every triangle that is reached, from which one, and whether both run along
     /// their common edge in the same direction, which neighbours that face the same way don't.
-    fn patches(&self, joins: impl Fn(&[EdgeUse]) -> bool, mut visit: impl FnMut(usize, usize, bool)) -> Patches {
-        // Where each triangle's sides are found among the sorted edges.
-        let mut sides = vec![[(0u32, 0u32); 3]; self.triangles.len()];
-        let mut filled = vec![0u8; self.triangles.len()];
-        let mut start = 0u32;
-        for fan in self.fans() {
-            let end = start + fan.len() as u32;
-            for edge in fan {
-                let triangle = edge.triangle as usize;
-                sides[triangle][usize::from(filled[triangle])] = (start, end);
-                filled[triangle] += 1;
-            }
-            start = end;
-        }
+    async fn patches(
+        &self,
+        joins: impl Fn(&[EdgeUse]) -> bool,
+        mut visit: impl FnMut(usize, usize, bool),
+        pace: &Pace,
+    ) -> Patches {
+        let sides = self.sides(&pace.part(0.0..0.3)).await;
+        let pace = pace.part(0.3..1.0);
+        let (mut stretch, mut done) = (Stretch::default(), 0);
         let mut of_triangle: Vec<Option<u32>> = vec![None; self.triangles.len()];
         let mut count = 0u32;
         let mut queue = VecDeque::new();
@@ -260,6 +210,10 @@ impl MeshTopology {
             of_triangle[seed] = Some(count);
             queue.push_back(seed);
             while let Some(from) = queue.pop_front() {
+                done += 1;
+                if stretch.ends_after(1) {
+                    pace.rest(done as f32 / self.triangles.len() as f32).await;
+                }
                 for (start, end) in sides[from] {
                     let fan = &self.edges[start as usize..end as usize];
                     if !joins(fan) {
@@ -280,6 +234,26 @@ impl MeshTopology {
         }
         Patches { of_triangle, count: count as usize }
     }
+
+    /// Where each triangle's sides are found among the sorted edges.
+    async fn sides(&self, pace: &Pace) -> Vec<[(u32, u32); 3]> {
+        let mut sides = vec![[(0u32, 0u32); 3]; self.triangles.len()];
+        let mut filled = vec![0u8; self.triangles.len()];
+        let (mut stretch, mut start) = (Stretch::default(), 0u32);
+        for fan in self.fans() {
+            let end = start + fan.len() as u32;
+            for edge in fan {
+                let triangle = edge.triangle as usize;
+                sides[triangle][usize::from(filled[triangle])] = (start, end);
+                filled[triangle] += 1;
+            }
+            start = end;
+            if stretch.ends_after(fan.len()) {
+                pace.rest(end as f32 / self.edges.len() as f32).await;
+            }
+        }
+        sides
+    }
 }
 
 /// Parts of a surface.
@@ -290,40 +264,11 @@ pub(crate) struct Patches {
     pub count: usize,
 }
 
-/// Drops triangles whose three vertices an earlier triangle has too, in whichever order.
-fn without_repeats(mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
-    let mut keys: Vec<([u32; 3], u32)> = triangles
-        .iter()
-        .enumerate()
-        .map(|(number, &corners)| {
-            let mut sorted = corners;
-            sorted.sort_unstable();
-            (sorted, number as u32)
-        })
-        .collect();
-    keys.sort_unstable();
-    let mut repeats: Vec<u32> = keys.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect();
-    repeats.sort_unstable();
-    let mut number = 0;
-    triangles.retain(|_| {
-        number += 1;
-        repeats.binary_search(&(number - 1)).is_err()
-    });
-    triangles
-}
-
-fn hash(position: Vec3) -> u64 {
-    // Adding 0 turns −0 into 0.
-    let [x, y, z] = (position + Vec3::ZERO).to_array().map(|value| u64::from(value.to_bits()));
-    let mixed = (x ^ y.rotate_left(21) ^ z.rotate_left(42)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let mixed = (mixed ^ (mixed >> 29) ^ z).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    mixed ^ (mixed >> 32)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::synthesis::mesh::MeshError;
+    use bevy_math::Vec3;
 
     /// A tetrahedron in which every triangle has vertices of its own.
     fn soup() -> Result<TriangleMesh, MeshError> {
@@ -346,17 +291,6 @@ mod tests {
         // Normals of the four vertices don't split.
         let normals = soup()?.vertex_normals();
         assert_eq!(normals[0], normals[3]);
-        Ok(())
-    }
-
-    #[test]
-    fn negative_zero_welds() -> Result<(), MeshError> {
-        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(-0.0, 0.0, -0.0), Vec3::Y, Vec3::NEG_X];
-        let mesh = TriangleMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]], None)?;
-        assert_eq!(mesh.weld().count(), 4);
-        assert_eq!(mesh.topology().components().1, 1);
-        assert_eq!(mesh.topology().boundary_edges(), 4);
-        assert!(!mesh.is_closed());
         Ok(())
     }
 

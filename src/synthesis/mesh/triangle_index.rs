@@ -1,6 +1,7 @@
 //! Questions to single triangles, and the index over those of a mesh.
 
 use crate::synthesis::mesh::TriangleMesh;
+use crate::synthesis::pace::{Pace, at_once};
 use crate::synthesis::space::bvh::{Bounds, BoxTree};
 use bevy_math::{DVec3, Vec3};
 
@@ -30,11 +31,23 @@ pub struct TriangleIndex {
 impl TriangleIndex {
     /// Indexes a mesh. Degenerate triangles are left out.
     pub fn new(mesh: &TriangleMesh) -> Self {
-        let numbers: Vec<u32> =
-            (0..mesh.triangles().len() as u32).filter(|&number| !mesh.is_degenerate(number as usize)).collect();
-        let tree = BoxTree::new(numbers.iter().map(|&number| Bounds::around(&mesh.corners(number as usize))));
+        at_once(Self::new_paced(mesh, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub async fn new_paced(mesh: &TriangleMesh, pace: &Pace) -> Self {
+        let mut numbers: Vec<u32> = Vec::with_capacity(mesh.triangles().len());
+        let take = |number: usize| {
+            if !mesh.is_degenerate(number) {
+                numbers.push(number as u32);
+            }
+        };
+        pace.part(0.0..0.05).each(mesh.triangles().len(), take).await;
+        let bounds = |id: usize| Bounds::around(&mesh.corners(numbers[id] as usize));
+        let tree = BoxTree::new_paced(numbers.len(), bounds, &pace.part(0.05..0.9)).await;
         let triangles: Vec<u32> = tree.order().iter().map(|&id| numbers[id as usize]).collect();
-        let corners = triangles.iter().map(|&number| mesh.corners(number as usize)).collect();
+        let corner = |slot: usize| mesh.corners(triangles[slot] as usize);
+        let corners = pace.part(0.9..1.0).collect(triangles.len(), corner).await;
         Self { tree, corners, triangles }
     }
 

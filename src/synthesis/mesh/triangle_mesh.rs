@@ -6,6 +6,7 @@
 //! [bounds](TriangleMesh::bounds)), smooth [normals](TriangleMesh::vertex_normals) and the [`topology`](super::topology).
 
 use super::Welding;
+use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::{
     DVec3, Vec2, Vec3,
     bounding::{Aabb3d, BoundingVolume},
@@ -218,15 +219,21 @@ impl TriangleMesh {
 
     /// [`vertex_normals`](Self::vertex_normals) with a welding at hand.
     pub fn vertex_normals_with(&self, welding: &Welding) -> Vec<Vec3> {
+        at_once(self.vertex_normals_paced(welding, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(crate) async fn vertex_normals_paced(&self, welding: &Welding, pace: &Pace) -> Vec<Vec3> {
         let mut sums = vec![DVec3::ZERO; welding.count()];
-        for (triangle, corners) in self.triangles.iter().enumerate() {
+        let add = |triangle: usize| {
             let normal = doubled_normal(self.corners(triangle));
-            for &corner in corners {
+            for &corner in &self.triangles[triangle] {
                 sums[welding.vertex(corner)] += normal;
             }
-        }
-        let normals: Vec<Vec3> = sums.into_iter().map(unit).collect();
-        (0..self.positions.len() as u32).map(|vertex| normals[welding.vertex(vertex)]).collect()
+        };
+        pace.part(0.0..0.6).each(self.triangles.len(), add).await;
+        let normals: Vec<Vec3> = pace.part(0.6..0.9).collect(sums.len(), |welded| unit(sums[welded])).await;
+        pace.part(0.9..1.0).collect(self.positions.len(), |vertex| normals[welding.vertex(vertex as u32)]).await
     }
 
     /// The same mesh with the triangles reversed for which `flip` says so; it is asked for each triangle's number.

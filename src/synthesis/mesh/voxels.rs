@@ -5,8 +5,12 @@
 //! axes both ways, and four must find a point enclosed: a sample of the generalised winding number (Jacobson, Kavan &
 //! Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers", 2013).
 
-use crate::synthesis::mesh::TriangleMesh;
+use crate::synthesis::{
+    mesh::TriangleMesh,
+    pace::{Pace, STRETCH, Stretch},
+};
 use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
+use std::ops::{Range, RangeInclusive};
 
 /// Why a mesh has no voxels.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -37,6 +41,8 @@ const PADDING: DVec3 = DVec3::new(0.31, 0.37, 0.43);
 const SLACK: f64 = 1.0e-6;
 /// Of six rays, how many must find a point enclosed.
 pub(crate) const MAJORITY: u8 = 4;
+/// What it costs to begin a layer of a triangle, in voxels.
+const LAYER: usize = 4;
 /// Most pairs of a triangle and a voxel that it touches.
 const MAX_TOUCHES: usize = 1 << 25;
 
@@ -128,28 +134,22 @@ impl Grid {
     }
 
     /// First and last voxel along an axis that an interval touches.
-    fn span(&self, axis: usize, min: f64, max: f64) -> std::ops::RangeInclusive<usize> {
+    fn span(&self, axis: usize, min: f64, max: f64) -> RangeInclusive<usize> {
         let last = self.size[axis] - 1;
         ((min - SLACK).max(0.0) as usize).min(last)..=((max + SLACK).max(0.0) as usize).min(last)
     }
 
     /// Every pair of a voxel and a triangle that touches it, in the order of the triangles.
-    pub fn touches(&self, mesh: &TriangleMesh) -> Result<Vec<(u32, u32)>, VoxelError> {
+    pub async fn touches(&self, mesh: &TriangleMesh, pace: &Pace) -> Result<Vec<(u32, u32)>, VoxelError> {
         let mut pairs = Vec::new();
-        for triangle in 0..mesh.triangles().len() {
-            let corners = mesh.corners(triangle).map(|corner| self.local(corner));
-            let (min, max) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
-            let [xs, ys, zs] = [0, 1, 2].map(|axis| self.span(axis, min[axis], max[axis]));
-            let single = xs.start() == xs.end() && ys.start() == ys.end() && zs.start() == zs.end();
-            let slabs = if single { Vec::new() } else { slabs(corners) };
-            for z in zs {
-                for y in ys.clone() {
-                    for x in xs.clone() {
-                        let center = DVec3::new(x as f64, y as f64, z as f64) + 0.5;
-                        if slabs.iter().all(|slab| slab.holds(center)) {
-                            pairs.push((self.number([x, y, z]) as u32, triangle as u32));
-                        }
-                    }
+        let mut stretch = Stretch::default();
+        let count = mesh.triangles().len();
+        for triangle in 0..count {
+            let reach = self.reach(mesh.corners(triangle));
+            for z in reach.spans[2].clone() {
+                self.touch_layer(&reach, z, |voxel| pairs.push((voxel, triangle as u32)));
+                if stretch.ends_after(LAYER + reach.layer()) {
+                    pace.rest(triangle as f32 / count as f32).await;
                 }
             }
             if pairs.len() > MAX_TOUCHES {
@@ -159,13 +159,36 @@ impl Grid {
         Ok(pairs)
     }
 
+    /// Which voxels a triangle may touch.
+    fn reach(&self, corners: [Vec3; 3]) -> Reach {
+        let corners = corners.map(|corner| self.local(corner));
+        let (min, max) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+        let spans = [0, 1, 2].map(|axis| self.span(axis, min[axis], max[axis]));
+        let single = spans.iter().all(|span| span.start() == span.end());
+        Reach { slabs: if single { Vec::new() } else { slabs(corners) }, spans }
+    }
+
+    /// Visits the voxels of a layer that a triangle touches.
+    fn touch_layer(&self, reach: &Reach, z: usize, mut visit: impl FnMut(u32)) {
+        let [xs, ys, _] = &reach.spans;
+        for y in ys.clone() {
+            for x in xs.clone() {
+                let center = DVec3::new(x as f64, y as f64, z as f64) + 0.5;
+                if reach.slabs.iter().all(|slab| slab.holds(center)) {
+                    visit(self.number([x, y, z]) as u32);
+                }
+            }
+        }
+    }
+
     /// What rays from the centre of every voxel say: for a closed mesh one each, for an open one six.
-    pub fn findings(&self, mesh: &TriangleMesh, closed: bool) -> Vec<Finding> {
-        let mut findings = vec![Finding::default(); self.len()];
+    pub async fn findings(&self, mesh: &TriangleMesh, closed: bool, pace: &Pace) -> Vec<Finding> {
+        let mut findings = pace.part(0.0..0.1).collect(self.len(), |_| Finding::default()).await;
         let axes = if closed { 1 } else { 3 };
         for axis in 0..axes {
-            let steps = self.steps(mesh, axis);
-            self.walk_columns(axis, &steps, |voxel, below, above| {
+            let pace = pace.part(0.1 + 0.8 * axis as f32 / axes as f32..0.1 + 0.8 * (axis + 1) as f32 / axes as f32);
+            let steps = self.steps(mesh, axis, &pace.part(0.0..0.4)).await;
+            let see = |voxel: usize, below: i16, above: i16| {
                 let finding = &mut findings[voxel];
                 if axis == 0 {
                     finding.winding = below;
@@ -174,27 +197,36 @@ impl Grid {
                     finding.votes += u8::from(seen != 0);
                     finding.agreeing += u8::from(seen == finding.winding);
                 }
-            });
+            };
+            self.walk_columns(axis, &steps, see, &pace.part(0.4..1.0)).await;
         }
-        for finding in &mut findings {
-            finding.votes *= 3 / axes as u8;
-            finding.agreeing *= 3 / axes as u8;
-        }
+        let scale = |stretch: Range<usize>| {
+            for finding in &mut findings[stretch] {
+                finding.votes *= 3 / axes as u8;
+                finding.agreeing *= 3 / axes as u8;
+            }
+        };
+        pace.part(0.9..1.0).stretches(self.len(), STRETCH, scale).await;
         findings
     }
 
     /// Where the columns of voxel centres along an axis cross the mesh: at the first voxel behind each crossing the
     /// change of the winding number.
-    fn steps(&self, mesh: &TriangleMesh, axis: usize) -> Vec<i16> {
+    async fn steps(&self, mesh: &TriangleMesh, axis: usize, pace: &Pace) -> Vec<i16> {
         let mut steps = vec![0i16; self.len()];
-        for triangle in 0..mesh.triangles().len() {
-            self.cross_columns(mesh.corners(triangle), axis, &mut steps);
+        let mut stretch = Stretch::default();
+        let count = mesh.triangles().len();
+        for triangle in 0..count {
+            let columns = self.cross_columns(mesh.corners(triangle), axis, &mut steps);
+            if stretch.ends_after(1 + columns) {
+                pace.rest(triangle as f32 / count as f32).await;
+            }
         }
         steps
     }
 
-    /// Adds the crossings of one triangle.
-    fn cross_columns(&self, corners: [Vec3; 3], axis: usize, steps: &mut [i16]) {
+    /// Adds the crossings of one triangle. Returns how many columns were tried.
+    fn cross_columns(&self, corners: [Vec3; 3], axis: usize, steps: &mut [i16]) -> usize {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let local = corners.map(|corner| self.local(corner) - 0.5);
         let flat = local.map(|corner| DVec2::new(corner[u], corner[v]));
@@ -203,8 +235,9 @@ impl Grid {
             // Empty where the triangle lies between two centres.
             min.ceil().max(0.0) as usize..((max.floor() + 1.0).max(0.0) as usize).min(size)
         };
-        for column_v in range(min.y, max.y, self.size[v]) {
-            for column_u in range(min.x, max.x, self.size[u]) {
+        let (columns_u, columns_v) = (range(min.x, max.x, self.size[u]), range(min.y, max.y, self.size[v]));
+        for column_v in columns_v.clone() {
+            for column_u in columns_u.clone() {
                 let point = DVec2::new(column_u as f64, column_v as f64);
                 let Some((facing, height)) = crossing(point, flat, local.map(|corner| corner[axis])) else { continue };
                 let behind = height.ceil().max(0.0) as usize;
@@ -217,28 +250,44 @@ impl Grid {
                 }
             }
         }
+        columns_u.len() * columns_v.len()
     }
 
     /// Visits every voxel with the windings that its centre sees along an axis, downwards and upwards.
-    fn walk_columns(&self, axis: usize, steps: &[i16], mut visit: impl FnMut(usize, i16, i16)) {
+    async fn walk_columns(&self, axis: usize, steps: &[i16], mut visit: impl FnMut(usize, i16, i16), pace: &Pace) {
         // Voxels side by side across the axis are `inner` apart along it.
         let inner: usize = self.size[..axis].iter().product();
         let slab = inner * self.size[axis];
+        // Rows from one rest to the next.
+        let some = inner * (STRETCH / inner).max(1);
+        let mut stretch = Stretch::default();
         let mut total = vec![0i16; inner];
         let mut running = vec![0i16; inner];
         for (number, steps) in steps.chunks_exact(slab).enumerate() {
+            let done = (number * slab) as f32 / self.len() as f32;
             total.fill(0);
             running.fill(0);
-            for row in steps.chunks_exact(inner) {
-                for (total, step) in total.iter_mut().zip(row) {
-                    *total = total.saturating_add(*step);
+            for rows in steps.chunks(some) {
+                for row in rows.chunks_exact(inner) {
+                    for (total, step) in total.iter_mut().zip(row) {
+                        *total = total.saturating_add(*step);
+                    }
+                }
+                if stretch.ends_after(rows.len()) {
+                    pace.rest(done).await;
                 }
             }
-            for (level, row) in steps.chunks_exact(inner).enumerate() {
-                let first = number * slab + level * inner;
-                for (place, ((running, total), step)) in running.iter_mut().zip(&total).zip(row).enumerate() {
-                    *running = running.saturating_add(*step);
-                    visit(first + place, *running, running.saturating_sub(*total));
+            let mut first = number * slab;
+            for rows in steps.chunks(some) {
+                for row in rows.chunks_exact(inner) {
+                    for (place, ((running, total), step)) in running.iter_mut().zip(&total).zip(row).enumerate() {
+                        *running = running.saturating_add(*step);
+                        visit(first + place, *running, running.saturating_sub(*total));
+                    }
+                    first += inner;
+                }
+                if stretch.ends_after(rows.len()) {
+                    pace.rest(done).await;
                 }
             }
         }
@@ -285,6 +334,20 @@ fn side(from: DVec2, to: DVec2, point: DVec2) -> (f64, i16) {
     (if ordered { area } else { -area }, sign)
 }
 
+/// The voxels around a triangle.
+struct Reach {
+    spans: [RangeInclusive<usize>; 3],
+    /// What tells voxels apart from the triangle; nothing where there is one voxel.
+    slabs: Vec<Slab>,
+}
+
+impl Reach {
+    /// Number of voxels in a layer.
+    fn layer(&self) -> usize {
+        self.spans[..2].iter().map(|span| span.end() - span.start() + 1).product()
+    }
+}
+
 /// A direction in which a triangle and a voxel can be told apart: the triangle's extent, widened by that of a voxel.
 struct Slab {
     axis: DVec3,
@@ -314,69 +377,9 @@ fn slabs(corners: [DVec3; 3]) -> Vec<Slab> {
         .collect()
 }
 
-/// One bit per voxel, and the number of bits set before each.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct BitGrid {
-    words: Vec<u64>,
-    ranks: Vec<u32>,
-}
-
-impl BitGrid {
-    /// A grid in which the given voxels are set.
-    pub fn new(len: usize, set: impl Iterator<Item = usize>) -> Self {
-        let mut words = vec![0u64; len.div_ceil(64)];
-        for voxel in set {
-            words[voxel / 64] |= 1 << (voxel % 64);
-        }
-        let mut before = 0;
-        let ranks = words.iter().map(|word| {
-            let rank = before;
-            before += word.count_ones();
-            rank
-        });
-        Self { ranks: ranks.collect(), words }
-    }
-
-    /// Whether a voxel is set.
-    pub fn contains(&self, voxel: usize) -> bool {
-        self.words[voxel / 64] >> (voxel % 64) & 1 == 1
-    }
-
-    /// How many voxels before this one are set.
-    pub fn rank(&self, voxel: usize) -> usize {
-        let below = self.words[voxel / 64] & ((1u64 << (voxel % 64)) - 1);
-        self.ranks[voxel / 64] as usize + below.count_ones() as usize
-    }
-
-    /// The voxels that are set, in order.
-    pub fn iter(&self) -> impl Iterator<Item = usize> {
-        self.words.iter().enumerate().flat_map(|(index, &word)| {
-            let mut left = word;
-            std::iter::from_fn(move || {
-                let bit = (left != 0).then(|| left.trailing_zeros() as usize)?;
-                left &= left - 1;
-                Some(index * 64 + bit)
-            })
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use crate::synthesis::mesh::voxels::*;
-
-    #[test]
-    fn bits_are_counted_and_listed() {
-        let set = [0usize, 1, 63, 64, 70, 129];
-        let bits = BitGrid::new(130, set.into_iter());
-        assert_eq!(bits.iter().collect::<Vec<_>>(), set);
-        for (rank, voxel) in set.into_iter().enumerate() {
-            assert!(bits.contains(voxel));
-            assert_eq!(bits.rank(voxel), rank);
-        }
-        assert!(!bits.contains(2) && !bits.contains(128));
-        assert_eq!(bits.rank(128), 5);
-    }
 
     #[test]
     fn lines_through_edges_and_vertices_cross_once() {

@@ -1,8 +1,8 @@
 //! Making the triangles of a mesh face the way that winding numbers need.
 
-use crate::synthesis::mesh::{TriangleMesh, topology::Patches};
 use crate::synthesis::{
-    mesh::{triangle_index::TriangleIndex, voxels::crossing},
+    mesh::{TriangleIndex, TriangleMesh, tetrahedron_volume, topology::Patches, voxels::crossing},
+    pace::Pace,
     space::bvh::Bounds,
 };
 use bevy_math::{DVec2, Vec3};
@@ -14,20 +14,20 @@ const PROBES: usize = 9;
 /// largest, unless they are cavities in it. `index` is that of the mesh.
 ///
 /// Also tells of which triangles the neighbours are missing or out of order: of none if the result is closed.
-pub(crate) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> (TriangleMesh, Vec<bool>) {
-    let topology = mesh.topology();
-    let misoriented = topology.misoriented(&mesh);
+pub(crate) async fn oriented(mesh: TriangleMesh, index: &TriangleIndex, pace: &Pace) -> (TriangleMesh, Vec<bool>) {
+    let topology = mesh.topology_paced(&pace.part(0.0..0.5)).await;
+    let misoriented = topology.misoriented_paced(&mesh, &pace.part(0.5..0.7)).await;
     let mesh = mesh.with_flipped(|triangle| misoriented[triangle]);
-    let (patches, closed) = topology.manifold_patches();
-    let volumes = shell_volumes(&mesh, &patches);
+    let (patches, closed) = topology.manifold_patches(&pace.part(0.7..0.8)).await;
+    let volumes = shell_volumes(&mesh, &patches, &pace.part(0.8..0.9)).await;
+    let pace = pace.part(0.9..1.0);
     let largest =
         volumes.iter().fold(0.0f64, |largest, volume| if volume.abs() > largest.abs() { *volume } else { largest });
     let against: Vec<bool> =
         volumes.iter().zip(closed).map(|(volume, closed)| closed && volume * largest < 0.0).collect();
-    let loose =
-        |turned: &dyn Fn(usize) -> bool| topology.unbalanced(|triangle| misoriented[triangle] != turned(triangle));
     if !against.contains(&true) {
-        return (mesh, loose(&|_| false));
+        let loose = topology.unbalanced_paced(|triangle| misoriented[triangle], &pace).await;
+        return (mesh, loose);
     }
     let mut members = vec![Vec::new(); patches.count];
     for (triangle, patch) in patches.of_triangle.iter().enumerate() {
@@ -36,27 +36,30 @@ pub(crate) fn oriented(mesh: TriangleMesh, index: &TriangleIndex) -> (TriangleMe
         }
     }
     let facing_right = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| !against[patch as usize]);
-    let flip: Vec<bool> = (0..patches.count)
-        .map(|patch| {
-            let step = members[patch].len().div_ceil(PROBES).max(1);
-            let mut probes = members[patch].iter().step_by(step).map(|&triangle| mesh.corners(triangle)[0]);
-            against[patch] && !probes.all(|probe| is_enclosed(probe, &mesh, index, facing_right))
-        })
-        .collect();
+    let mut flip: Vec<bool> = Vec::with_capacity(patches.count);
+    for patch in 0..patches.count {
+        let step = members[patch].len().div_ceil(PROBES).max(1);
+        let mut probes = members[patch].iter().step_by(step).map(|&triangle| mesh.corners(triangle)[0]);
+        flip.push(against[patch] && !probes.all(|probe| is_enclosed(probe, &mesh, index, facing_right)));
+        if against[patch] {
+            pace.rest(0.0).await;
+        }
+    }
     let turned = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| flip[patch as usize]);
-    let loose = loose(&turned);
+    let loose = topology.unbalanced_paced(|triangle| misoriented[triangle] != turned(triangle), &pace).await;
     (mesh.with_flipped(turned), loose)
 }
 
 /// Signed volume of every part of the surface.
-fn shell_volumes(mesh: &TriangleMesh, patches: &Patches) -> Vec<f64> {
+async fn shell_volumes(mesh: &TriangleMesh, patches: &Patches, pace: &Pace) -> Vec<f64> {
     let mut volumes = vec![0.0; patches.count];
     let origin = mesh.corners(0)[0];
-    for (triangle, patch) in patches.of_triangle.iter().enumerate() {
-        if let Some(patch) = patch {
-            volumes[*patch as usize] += crate::synthesis::mesh::tetrahedron_volume(mesh.corners(triangle), origin);
+    let add = |triangle: usize| {
+        if let Some(patch) = patches.of_triangle[triangle] {
+            volumes[patch as usize] += tetrahedron_volume(mesh.corners(triangle), origin);
         }
-    }
+    };
+    pace.each(patches.of_triangle.len(), add).await;
     volumes
 }
 

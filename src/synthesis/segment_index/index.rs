@@ -17,10 +17,8 @@ use crate::synthesis::segment_index::{
     run::{Run, box_of, curve_through},
 };
 use crate::synthesis::{
-    space::{
-        morton::Curve,
-        packed_boxes::Pack,
-    },
+    pace::{Pace, at_once},
+    space::{morton::Curve, packed_boxes::Pack},
     tree::{NodeId, Place, VesselTree},
 };
 use bevy_math::Vec3;
@@ -49,8 +47,17 @@ impl SegmentIndex {
 
     /// Indexes all segments of a tree.
     pub fn new(tree: &VesselTree) -> Self {
+        at_once(Self::new_paced(tree, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub async fn new_paced(tree: &VesselTree, pace: &Pace) -> Self {
         let mut index = Self::default();
-        index.extend(tree);
+        if !tree.is_empty() {
+            index.curve = curve_through(tree, &pace.part(0.0..0.1)).await;
+            let nodes = 0..tree.len() as u32;
+            index.runs.push(Run::new(tree, nodes, &index.curve, &pace.part(0.1..1.0)).await);
+        }
         index
     }
 
@@ -100,9 +107,9 @@ impl SegmentIndex {
             }
         }
         if start == 0 {
-            self.curve = curve_through(tree, 0..end);
+            self.curve = at_once(curve_through(tree, &Pace::default()));
         }
-        self.runs.push(Run::new(tree, start..end, &self.curve));
+        self.runs.push(at_once(Run::new(tree, start..end, &self.curve, &Pace::default())));
     }
 
     /// Begins merges where they are due, and goes on with each for some steps.

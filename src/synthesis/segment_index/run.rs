@@ -5,6 +5,7 @@
 
 use crate::synthesis::segment_index::round_cone::box_around;
 use crate::synthesis::{
+    pace::Pace,
     space::{morton::Curve, packed_boxes::PackedBoxes},
     tree::{NO_PARENT, VesselTree},
 };
@@ -33,11 +34,19 @@ fn middle(tree: &VesselTree, node: u32) -> Option<Vec3> {
     (parent != NO_PARENT).then(|| tree.positions()[node as usize].midpoint(tree.positions()[parent as usize]))
 }
 
-/// A curve through the segments of some nodes, with room around for those that grow later.
-pub(super) fn curve_through(tree: &VesselTree, nodes: Range<u32>) -> Curve {
+/// A curve through the segments of a tree, with room around for those that grow later.
+pub(super) async fn curve_through(tree: &VesselTree, pace: &Pace) -> Curve {
     /// How much wider the curve's box is than that of the segments.
     const ROOM: f32 = 8.0;
-    Curve::around(nodes.filter_map(|node| middle(tree, node)), ROOM)
+    let mut corners: Option<[Vec3; 2]> = None;
+    let enlarge = |node: usize| {
+        if let Some(middle) = middle(tree, node as u32) {
+            let [min, max] = corners.unwrap_or([middle; 2]);
+            corners = Some([min.min(middle), max.max(middle)]);
+        }
+    };
+    pace.each(tree.len(), enlarge).await;
+    Curve::around(corners.into_iter().flatten(), ROOM)
 }
 
 pub(super) fn box_of(tree: &VesselTree, node: u32) -> (Vec3, Vec3) {
@@ -45,16 +54,22 @@ pub(super) fn box_of(tree: &VesselTree, node: u32) -> (Vec3, Vec3) {
 }
 
 impl Run {
-    pub fn new(tree: &VesselTree, nodes: Range<u32>, curve: &Curve) -> Self {
-        let place = |node: u32| middle(tree, node).map(|middle| (curve.key(middle), node));
-        let mut places: Vec<(u64, u32)> = nodes.clone().filter_map(place).collect();
-        places.sort_unstable();
-        let (keys, ends): (Vec<u64>, Vec<u32>) = places.into_iter().unzip();
+    pub async fn new(tree: &VesselTree, nodes: Range<u32>, curve: &Curve, pace: &Pace) -> Self {
+        let mut places: Vec<(u64, u32)> = Vec::with_capacity(nodes.len());
+        let place = |number: usize| {
+            let node = nodes.start + number as u32;
+            if let Some(middle) = middle(tree, node) {
+                places.push((curve.key(middle), node));
+            }
+        };
+        pace.part(0.0..0.2).each(nodes.len(), place).await;
+        pace.part(0.2..0.6).sort(&mut places).await;
+        let keys = pace.part(0.6..0.63).collect(places.len(), |slot| places[slot].0).await;
+        let ends: Vec<u32> = pace.part(0.63..0.66).collect(places.len(), |slot| places[slot].1).await;
         let mut slots = vec![0; nodes.len()];
-        for (slot, &node) in (1..).zip(&ends) {
-            slots[(node - nodes.start) as usize] = slot;
-        }
-        let boxes = PackedBoxes::new(ends.len(), |slot| box_of(tree, ends[slot]));
+        let enter = |slot: usize| slots[(ends[slot] - nodes.start) as usize] = slot as u32 + 1;
+        pace.part(0.66..0.7).each(ends.len(), enter).await;
+        let boxes = PackedBoxes::new(ends.len(), |slot| box_of(tree, ends[slot]), &pace.part(0.7..1.0)).await;
         Self { nodes, ends, boxes, keys, slots, merge: None }
     }
 

@@ -4,7 +4,9 @@
 //! "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007) into one flat array in depth-first order, and
 //! asked without allocating.
 
+use crate::synthesis::pace::{Pace, STRETCH, Stretch, at_once};
 use bevy_math::{BVec3A, Vec3, Vec3A};
+use std::ops::Range;
 
 /// Candidate planes per split, plus one.
 const BINS: usize = 16;
@@ -110,8 +112,16 @@ impl Item {
 impl BoxTree {
     /// Builds the tree over boxes, which may overlap, be flat or coincide.
     pub fn new(boxes: impl IntoIterator<Item = Bounds>) -> Self {
-        let mut items: Vec<Item> =
-            boxes.into_iter().enumerate().map(|(id, bounds)| Item { bounds, id: id as u32, bin: 0 }).collect();
+        let boxes: Vec<Bounds> = boxes.into_iter().collect();
+        at_once(Self::new_paced(boxes.len(), |id| boxes[id], &Pace::default()))
+    }
+
+    /// The same, with rests: over so many boxes, each asked for once.
+    pub async fn new_paced(count: usize, box_of: impl Fn(usize) -> Bounds, pace: &Pace) -> Self {
+        let item = |id: usize| Item { bounds: box_of(id), id: id as u32, bin: 0 };
+        let mut items: Vec<Item> = pace.part(0.0..0.1).collect(count, item).await;
+        let pace = pace.part(0.1..1.0);
+        let mut stretch = Stretch::default();
         let mut nodes: Vec<Node> = Vec::with_capacity(items.len());
         // Ranges still to be made into nodes, with the node whose second child they are.
         let mut pending = Vec::new();
@@ -124,21 +134,38 @@ impl BoxTree {
                 nodes[parent].link = index as u32;
             }
             let range = &mut items[start..end];
+            // Those before are where they stay.
+            let done = start as f32 / count as f32;
+            if stretch.ends_after(range.len().min(STRETCH)) {
+                pace.rest(done).await;
+            }
             let (mut bounds, mut centres) = (Bounds::EMPTY, Bounds::EMPTY);
-            for item in range.iter() {
-                bounds = bounds.with(item.bounds);
-                centres = centres.with_point(item.centre());
+            for items in range.chunks(STRETCH) {
+                for item in items {
+                    bounds = bounds.with(item.bounds);
+                    centres = centres.with_point(item.centre());
+                }
+                if items.len() == STRETCH {
+                    pace.rest(done).await;
+                }
             }
             if range.len() <= LEAF {
                 nodes.push(Node { bounds, link: start as u32, count: range.len() as u32 });
                 continue;
             }
             nodes.push(Node { bounds, link: 0, count: 0 });
-            let middle = start + split(range, &centres, depth);
+            let middle = start
+                + match Split::new(&centres, depth) {
+                    None => halve(range, &centres),
+                    Some(split) if range.len() <= STRETCH => split.carry_out(range),
+                    Some(split) => split.carry_out_paced(range, &pace, done).await,
+                };
             pending.push((middle, end, Some(index), depth + 1));
             pending.push((start, middle, None, depth + 1));
         }
-        Self { nodes, order: items.iter().map(|item| item.id).collect() }
+        let order = items.iter().map(|item| item.id).collect();
+        pace.rest(1.0).await;
+        Self { nodes, order }
     }
 
     /// For every slot the number of its box in the list that the tree was built from.
@@ -234,36 +261,87 @@ impl BoxTree {
     }
 }
 
-/// Sorts items to two sides of a plane and says how many are on the first: at least one, and not all. `centres` bounds
-/// their centres, doubled.
-fn split(items: &mut [Item], centres: &Bounds, depth: u32) -> usize {
-    let size = centres.max - centres.min;
-    let axis = size.max_position();
+/// Sorts items to two sides by number, along the longest axis of their centres, and says how many are on the first.
+fn halve(items: &mut [Item], centres: &Bounds) -> usize {
+    let axis = (centres.max - centres.min).max_position();
     let half = items.len() / 2;
-    // Centres that coincide can only be told apart by number; so can those of degenerate extents.
-    let apart = size[axis] > 0.0;
-    if depth >= DEEP || !apart {
-        items.select_nth_unstable_by(half, |a, b| a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.id.cmp(&b.id)));
-        return half;
+    items.select_nth_unstable_by(half, |a, b| a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.id.cmp(&b.id)));
+    half
+}
+
+/// A split of items by a plane across an axis. What it does to all of them it may do to some at a time.
+struct Split {
+    axis: usize,
+    /// Where bins begin, and how many there are in a length.
+    min: f32,
+    scale: f32,
+    bins: [(Bounds, u32); BINS],
+    /// Items that have been found to be on the first side.
+    middle: usize,
+}
+
+impl Split {
+    /// `None` where centres coincide, which can only be told apart by number; so can those of degenerate extents.
+    fn new(centres: &Bounds, depth: u32) -> Option<Self> {
+        let size = centres.max - centres.min;
+        let axis = size.max_position();
+        let is_possible = depth < DEEP && size[axis] > 0.0;
+        is_possible.then(|| Self {
+            axis,
+            min: centres.min[axis],
+            scale: BINS as f32 / size[axis],
+            bins: [(Bounds::EMPTY, 0); BINS],
+            middle: 0,
+        })
     }
-    let scale = BINS as f32 / size[axis];
-    let mut bins = [(Bounds::EMPTY, 0u32); BINS];
-    for item in items.iter_mut() {
-        item.bin = (((item.centre()[axis] - centres.min[axis]) * scale) as u32).min(BINS as u32 - 1);
-        let (bounds, count) = &mut bins[item.bin as usize];
-        *bounds = bounds.with(item.bounds);
-        *count += 1;
-    }
-    let plane = cheapest_plane(&bins);
-    let mut middle = 0;
-    for i in 0..items.len() {
-        if items[i].bin < plane {
-            items.swap(i, middle);
-            middle += 1;
+
+    /// Takes note of the bins that some items fall into.
+    fn sort_into_bins(&mut self, items: &mut [Item]) {
+        for item in items {
+            item.bin = (((item.centre()[self.axis] - self.min) * self.scale) as u32).min(BINS as u32 - 1);
+            let (bounds, count) = &mut self.bins[item.bin as usize];
+            *bounds = bounds.with(item.bounds);
+            *count += 1;
         }
     }
-    // The first and the last bin hold the outermost centres, so neither side is empty unless rounding has its way.
-    if middle == 0 || middle == items.len() { half } else { middle }
+
+    /// Moves those of some items that are before a plane to the first side.
+    fn part_at(&mut self, plane: u32, items: &mut [Item], range: Range<usize>) {
+        for i in range {
+            if items[i].bin < plane {
+                items.swap(i, self.middle);
+                self.middle += 1;
+            }
+        }
+    }
+
+    /// How many items are on the first side: at least one, and not all.
+    fn end(&self, items: &[Item]) -> usize {
+        // The first and the last bin hold the outermost centres, so neither side is empty unless rounding has its way.
+        if self.middle == 0 || self.middle == items.len() { items.len() / 2 } else { self.middle }
+    }
+
+    /// Sorts items to the two sides of the cheapest plane, and says how many are on the first.
+    fn carry_out(mut self, items: &mut [Item]) -> usize {
+        self.sort_into_bins(items);
+        let plane = cheapest_plane(&self.bins);
+        self.part_at(plane, items, 0..items.len());
+        self.end(items)
+    }
+
+    /// The same, with rests.
+    async fn carry_out_paced(mut self, items: &mut [Item], pace: &Pace, done: f32) -> usize {
+        for items in items.chunks_mut(STRETCH) {
+            self.sort_into_bins(items);
+            pace.rest(done).await;
+        }
+        let plane = cheapest_plane(&self.bins);
+        for start in (0..items.len()).step_by(STRETCH) {
+            self.part_at(plane, items, start..items.len().min(start + STRETCH));
+            pace.rest(done).await;
+        }
+        self.end(items)
+    }
 }
 
 /// The bin before which to split so that area times number, over both sides, is least.

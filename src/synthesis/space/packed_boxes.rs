@@ -10,6 +10,7 @@
 //! meets in four thirds of the time, what a large one meets in less. Nor is it a grid: segments lie on sheets and in
 //! clusters, and one long segment among short ones would fill many cells.
 
+use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::Vec3;
 
 /// Boxes in a pack.
@@ -188,10 +189,10 @@ pub(crate) struct PackedBoxes {
 
 impl PackedBoxes {
     /// Packs `len` boxes, asked for in the order of their slots.
-    pub(crate) fn new(len: usize, box_at: impl FnMut(usize) -> Corners) -> Self {
+    pub(crate) async fn new(len: usize, box_at: impl FnMut(usize) -> Corners, pace: &Pace) -> Self {
         let mut tree = Self::reserve(len);
         tree.packs.resize(tree.starts.last().map_or(0, |&end| end as usize), Pack::EMPTY);
-        tree.refit(box_at);
+        tree.refit_paced(box_at, pace).await;
         tree
     }
 
@@ -240,16 +241,22 @@ impl PackedBoxes {
     }
 
     /// Measures every box anew.
-    pub(crate) fn refit(&mut self, mut box_at: impl FnMut(usize) -> Corners) {
-        for slot in 0..self.len {
-            self.packs[slot / LANES].set(slot % LANES, box_at(slot));
-        }
+    pub(crate) fn refit(&mut self, box_at: impl FnMut(usize) -> Corners) {
+        at_once(self.refit_paced(box_at, &Pace::default()));
+    }
+
+    async fn refit_paced(&mut self, mut box_at: impl FnMut(usize) -> Corners, pace: &Pace) {
+        let packs = &mut self.packs;
+        let measure = |slot: usize| packs[slot / LANES].set(slot % LANES, box_at(slot));
+        pace.part(0.0..0.8).each(self.len, measure).await;
         for level in 1..self.levels() {
             let (below, start) = (self.starts[level - 1] as usize, self.starts[level] as usize);
-            for item in 0..start - below {
-                let around = self.packs[below + item].around();
-                self.packs[start + item / LANES].set(item % LANES, around);
-            }
+            let packs = &mut self.packs;
+            let raise = |item: usize| {
+                let around = packs[below + item].around();
+                packs[start + item / LANES].set(item % LANES, around);
+            };
+            pace.part(0.8..1.0).each(start - below, raise).await;
         }
     }
 
@@ -373,7 +380,7 @@ mod tests {
     fn levels_hold_any_number_of_boxes() {
         for len in [0, 1, 7, 8, 9, 63, 64, 65, 512, 513, 5000] {
             let unit = |slot: usize| (Vec3::splat(slot as f32), Vec3::splat(slot as f32 + 0.5));
-            let tree = PackedBoxes::new(len, unit);
+            let tree = at_once(PackedBoxes::new(len, unit, &Pace::default()));
             let everywhere = (Vec3::NEG_INFINITY, Vec3::INFINITY);
             let mut slots = Vec::new();
             tree.walk(|pack| pack.overlaps(everywhere), |slot| slots.push(slot));

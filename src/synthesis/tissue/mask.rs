@@ -2,7 +2,8 @@
 
 use crate::synthesis::random::VesselRng;
 use crate::synthesis::{
-    mesh::voxels::BitGrid,
+    mesh::bit_grid::BitGrid,
+    pace::{Pace, Stretch, at_once},
     space::bvh::{Bounds, BoxTree},
     tissue::{
         Extent, Tissue, TissuePoint,
@@ -47,8 +48,22 @@ impl Mask {
     /// A list that does not have one entry per pixel, or none that is set; a spacing that is not above 0; coordinates that
     /// are not finite.
     pub fn image(size: UVec2, spacing: Vec2, origin: Vec3, inside: &[bool]) -> Result<Self, TissueError> {
+        at_once(Self::image_paced(size, spacing, origin, inside, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`image`](Self::image).
+    pub async fn image_paced(
+        size: UVec2,
+        spacing: Vec2,
+        origin: Vec3,
+        inside: &[bool],
+        pace: &Pace,
+    ) -> Result<Self, TissueError> {
         // The thickness of a pixel is of no account.
-        Self::new(size.extend(1), spacing.extend(1.0), origin, inside, true)
+        Self::new(size.extend(1), [spacing.extend(1.0), origin], inside, true, pace).await
     }
 
     /// The pixels of a grey image that are at least `threshold`. See [`image`](Self::image).
@@ -73,7 +88,21 @@ impl Mask {
     /// A list that does not have one entry per voxel, or none that is set; a spacing that is not above 0; coordinates that
     /// are not finite.
     pub fn voxels(size: UVec3, spacing: Vec3, origin: Vec3, inside: &[bool]) -> Result<Self, TissueError> {
-        Self::new(size, spacing, origin, inside, false)
+        at_once(Self::voxels_paced(size, spacing, origin, inside, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`voxels`](Self::voxels).
+    pub async fn voxels_paced(
+        size: UVec3,
+        spacing: Vec3,
+        origin: Vec3,
+        inside: &[bool],
+        pace: &Pace,
+    ) -> Result<Self, TissueError> {
+        Self::new(size, [spacing, origin], inside, false, pace).await
     }
 
     /// The voxels of a grey volume image that are at least `threshold`. See [`voxels`](Self::voxels).
@@ -90,7 +119,13 @@ impl Mask {
         Self::voxels(size, spacing, origin, &above(grey, threshold))
     }
 
-    fn new(size: UVec3, spacing: Vec3, origin: Vec3, inside: &[bool], flat: bool) -> Result<Self, TissueError> {
+    async fn new(
+        size: UVec3,
+        [spacing, origin]: [Vec3; 2],
+        inside: &[bool],
+        flat: bool,
+        pace: &Pace,
+    ) -> Result<Self, TissueError> {
         let size = size.to_array().map(|count| count as usize);
         let expected = size[0].saturating_mul(size[1]).saturating_mul(size[2]);
         if expected != inside.len() || expected > Self::MAX_CELLS {
@@ -104,8 +139,9 @@ impl Mask {
             "the far corner of the mask",
             origin + spacing * Vec3::from_array(size.map(|count| count as f32)),
         )?;
-        let cells = BitGrid::new(expected, (0..expected).filter(|&cell| inside[cell]));
-        let set: Vec<u32> = cells.iter().map(|cell| cell as u32).collect();
+        let is_set = |cell: usize| inside[cell].then_some(cell);
+        let cells = BitGrid::new(expected, expected, is_set, &pace.part(0.0..0.3)).await;
+        let set = cells.list(&pace.part(0.3..0.5)).await;
         let mut mask = Self {
             size,
             spacing,
@@ -120,9 +156,9 @@ impl Mask {
         if mask.set.is_empty() {
             return Err(TissueError::EmptyMask);
         }
-        let runs = mask.list_runs();
+        let runs = mask.list_runs(&pace.part(0.5..0.6)).await;
         mask.bounds = runs.iter().fold(Bounds::EMPTY, |bounds, &run| bounds.with(run));
-        mask.index = BoxTree::new(runs.iter().copied());
+        mask.index = BoxTree::new_paced(runs.len(), |run| runs[run], &pace.part(0.6..1.0)).await;
         mask.runs = mask.index.order().iter().map(|&id| runs[id as usize]).collect();
         Ok(mask)
     }
@@ -133,15 +169,18 @@ impl Mask {
     }
 
     /// Runs of set cells along x.
-    fn list_runs(&self) -> Vec<Bounds> {
-        self.set
-            .chunk_by(|&a, &b| b == a + 1 && !(b as usize).is_multiple_of(self.size[0]))
-            .map(|run| {
-                let min = self.corner(run[0] as usize, Vec3::ZERO);
-                let max = self.corner(run[run.len() - 1] as usize, Vec3::ONE);
-                Bounds { min: min.into(), max: max.into() }
-            })
-            .collect()
+    async fn list_runs(&self, pace: &Pace) -> Vec<Bounds> {
+        let (mut runs, mut stretch, mut done) = (Vec::new(), Stretch::default(), 0);
+        for run in self.set.chunk_by(|&a, &b| b == a + 1 && !(b as usize).is_multiple_of(self.size[0])) {
+            let min = self.corner(run[0] as usize, Vec3::ZERO);
+            let max = self.corner(run[run.len() - 1] as usize, Vec3::ONE);
+            runs.push(Bounds { min: min.into(), max: max.into() });
+            done += run.len();
+            if stretch.ends_after(run.len()) {
+                pace.rest(done as f32 / self.set.len() as f32).await;
+            }
+        }
+        runs
     }
 
     /// The point at a place within a cell, from 0 to 1 along each axis.

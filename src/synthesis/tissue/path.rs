@@ -1,8 +1,9 @@
 //! Guides: polylines along which large vessels are led before the tissue around them is filled (Rauch & Harders 2021,
 //! Fig. 4).
 
-use crate::synthesis::random::VesselRng;
 use crate::synthesis::{
+    pace::{Pace, SHORT_STRETCH, at_once},
+    random::VesselRng,
     space::bvh::{Bounds, BoxTree},
     tissue::{
         Extent, Tissue, TissuePoint,
@@ -15,7 +16,7 @@ use bevy_math::{
     bounding::{Aabb3d, BoundingVolume},
 };
 use rand::RngExt;
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 /// Pieces that a guide is cut into when it is laid on another tissue.
 const PIECES: f32 = 256.0;
@@ -74,21 +75,35 @@ impl GuidePath {
     /// # Errors
     /// A guide that comes to lie in one point.
     pub fn over(self, base: Arc<dyn Tissue>) -> Result<Self, TissueError> {
+        at_once(self.over_paced(base, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`over`](Self::over).
+    pub async fn over_paced(self, base: Arc<dyn Tissue>, pace: &Pace) -> Result<Self, TissueError> {
         let spacing = self.length() / PIECES;
         let mut points = vec![base.closest_point(self.points[0]).position];
-        for pair in self.points.windows(2) {
+        for (number, pair) in self.points.windows(2).enumerate() {
             let pieces = (pair[0].distance(pair[1]) / spacing).ceil().max(1.0);
-            points.extend(
-                (1..=pieces as u32)
-                    .map(|piece| base.closest_point(pair[0].lerp(pair[1], piece as f32 / pieces)).position),
-            );
+            for piece in 1..=pieces as u32 {
+                points.push(base.closest_point(pair[0].lerp(pair[1], piece as f32 / pieces)).position);
+                if points.len().is_multiple_of(SHORT_STRETCH) {
+                    pace.rest(0.5 * number as f32 / self.points.len() as f32).await;
+                }
+            }
         }
         let mut laid = Self::build(points, self.deviations)?;
-        let gaps = laid.points.windows(2).map(|pair| {
-            let middle = pair[0].midpoint(pair[1]);
-            base.closest_point(middle).position.distance(middle)
-        });
-        laid.slack = 2.0 * gaps.fold(0.0, f32::max);
+        let mut widest = 0.0f32;
+        let measure = |gaps: Range<usize>| {
+            for gap in gaps {
+                let middle = laid.points[gap].midpoint(laid.points[gap + 1]);
+                widest = widest.max(base.closest_point(middle).position.distance(middle));
+            }
+        };
+        pace.part(0.5..1.0).stretches(laid.points.len() - 1, SHORT_STRETCH, measure).await;
+        laid.slack = 2.0 * widest;
         laid.base = Some(base);
         Ok(laid)
     }

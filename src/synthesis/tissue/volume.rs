@@ -7,18 +7,21 @@
 //! Inside is what the mesh winds around. That forgives duplicated vertices, small holes, overlapping and nested shells and
 //! triangles that face the wrong way.
 
-use crate::synthesis::{mesh::TriangleMesh, random::VesselRng};
 use crate::synthesis::{
     mesh::{
-        triangle_index::TriangleIndex,
-        voxels::{BitGrid, Finding, Grid, MAJORITY, crossing},
+        TriangleIndex, TriangleMesh,
+        bit_grid::BitGrid,
+        voxels::{Finding, Grid, MAJORITY, crossing},
         winding::oriented,
     },
+    pace::{Pace, SHORT_STRETCH, at_once},
+    random::VesselRng,
     space::bvh::Bounds,
     tissue::{Extent, Tissue, TissuePoint, error::TissueError},
 };
 use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
 use rand::RngExt;
+use std::ops::Range;
 
 /// Steps whose multiples fill the unit cube evenly: powers of 1/g, where g⁴ = g + 1 (Roberts, "The Unreasonable
 /// Effectiveness of Quasirandom Sequences", 2018).
@@ -79,20 +82,30 @@ impl MeshVolume {
     /// [`TissueError::Voxels`] for a resolution
     /// that cannot be used with this mesh; [`TissueError::NoInside`] for a mesh that encloses nothing.
     pub fn new(mesh: &TriangleMesh, resolution: u32) -> Result<Self, TissueError> {
+        at_once(Self::new_paced(mesh, resolution, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub async fn new_paced(mesh: &TriangleMesh, resolution: u32, pace: &Pace) -> Result<Self, TissueError> {
         let grid = Grid::over(&mesh.bounds(), resolution)?;
-        let mesh = mesh.welded();
-        let index = TriangleIndex::new(&mesh);
-        let (mesh, loose) = oriented(mesh, &index);
+        let mesh = mesh.welded_paced(&pace.part(0.0..0.1)).await;
+        let index = TriangleIndex::new_paced(&mesh, &pace.part(0.1..0.25)).await;
+        let (mesh, loose) = oriented(mesh, &index, &pace.part(0.25..0.4)).await;
         let closed = !loose.contains(&true);
-        let touches = grid.touches(&mesh)?;
-        let findings = grid.findings(&mesh, closed);
-        let touched = BitGrid::new(grid.len(), touches.iter().map(|&(voxel, _)| voxel as usize));
-        let enclosed = |voxel: &usize| findings[*voxel].is_inside() && !touched.contains(*voxel);
-        let inside = BitGrid::new(grid.len(), (0..grid.len()).filter(enclosed));
-        let (cells, triangles) = cells(&touched, &touches, &findings, &loose);
+        let touches = grid.touches(&mesh, &pace.part(0.4..0.55)).await?;
+        let findings = grid.findings(&mesh, closed, &pace.part(0.55..0.75)).await;
+        let touched = |touch: usize| Some(touches[touch].0 as usize);
+        let touched = BitGrid::new(grid.len(), touches.len(), touched, &pace.part(0.75..0.77)).await;
+        let enclosed = |voxel: usize| (findings[voxel].is_inside() && !touched.contains(voxel)).then_some(voxel);
+        let inside = BitGrid::new(grid.len(), grid.len(), enclosed, &pace.part(0.77..0.8)).await;
+        let (cells, triangles) = cells(&touched, &touches, &findings, &loose, &pace.part(0.8..0.85)).await;
+        let corners = pace.part(0.85..0.86).collect(mesh.triangles().len(), |triangle| mesh.corners(triangle)).await;
         let mut volume = Self {
-            whole: inside.iter().map(|voxel| voxel as u32).collect(),
-            corners: (0..mesh.triangles().len()).map(|triangle| mesh.corners(triangle)).collect(),
+            whole: inside.list(&pace.part(0.86..0.88)).await,
+            corners,
             bounds: mesh.bounds(),
             volume: 0.0,
             closed,
@@ -103,7 +116,7 @@ impl MeshVolume {
             cells,
             triangles,
         };
-        volume.volume = volume.measure();
+        volume.volume = volume.measure(&pace.part(0.88..1.0)).await;
         if volume.volume > 0.0 { Ok(volume) } else { Err(TissueError::NoInside { resolution }) }
     }
 
@@ -123,13 +136,16 @@ impl MeshVolume {
     }
 
     /// Volume: whole voxels, and touched ones by the share of their points that are inside.
-    fn measure(&self) -> f32 {
-        let inside = |probe: &usize| {
+    async fn measure(&self, pace: &Pace) -> f32 {
+        let is_inside = |probe: &usize| {
             let slot = probe * self.touched_voxels() / Self::PROBES;
             let corner = self.grid.corner(self.cells[slot].voxel as usize);
             self.is_inside(slot, self.grid.global(corner + (EVEN_STEPS * (*probe as f64)).fract()))
         };
-        let share = (0..Self::PROBES).filter(inside).count() as f64 / Self::PROBES as f64;
+        let mut inside = 0;
+        let count = |probes: Range<usize>| inside += probes.filter(is_inside).count();
+        pace.stretches(Self::PROBES, SHORT_STRETCH, count).await;
+        let share = inside as f64 / Self::PROBES as f64;
         let cell = self.grid.cell();
         ((self.whole.len() as f64 + share * self.touched_voxels() as f64) * cell * cell * cell) as f32
     }
@@ -239,34 +255,40 @@ impl Tissue for MeshVolume {
 }
 
 /// Sorts the pairs of voxel and triangle by voxel. Where a triangle is `loose`, its voxels are not certain.
-fn cells(touched: &BitGrid, touches: &[(u32, u32)], findings: &[Finding], loose: &[bool]) -> (Vec<Cell>, Vec<u32>) {
-    let mut cells: Vec<Cell> = touched
-        .iter()
-        .map(|voxel| Cell {
-            voxel: voxel as u32,
-            first: 0,
-            winding: findings[voxel].winding,
-            certain: findings[voxel].is_unanimous(),
-        })
-        .chain([Cell::default()])
-        .collect();
-    for &(voxel, triangle) in touches {
-        cells[touched.rank(voxel as usize)].certain &= !loose[triangle as usize];
-    }
-    // Counted one entry further on, so that the running sum gives each voxel's beginning.
-    for &(voxel, _) in touches {
-        cells[touched.rank(voxel as usize) + 1].first += 1;
-    }
+async fn cells(
+    touched: &BitGrid,
+    touches: &[(u32, u32)],
+    findings: &[Finding],
+    loose: &[bool],
+    pace: &Pace,
+) -> (Vec<Cell>, Vec<u32>) {
+    let voxels = touched.list(&pace.part(0.0..0.1)).await;
+    let cell = |slot: usize| {
+        let Some(&voxel) = voxels.get(slot) else { return Cell::default() };
+        let finding = findings[voxel as usize];
+        Cell { voxel, first: 0, winding: finding.winding, certain: finding.is_unanimous() }
+    };
+    let mut cells: Vec<Cell> = pace.part(0.1..0.2).collect(voxels.len() + 1, cell).await;
+    let count = |touch: usize| {
+        let (voxel, triangle) = touches[touch];
+        let slot = touched.rank(voxel as usize);
+        cells[slot].certain &= !loose[triangle as usize];
+        // Counted one entry further on, so that the running sum gives each voxel's beginning.
+        cells[slot + 1].first += 1;
+    };
+    pace.part(0.2..0.5).each(touches.len(), count).await;
     for slot in 1..cells.len() {
         cells[slot].first += cells[slot - 1].first;
     }
     let mut next: Vec<u32> = cells.iter().map(|cell| cell.first).collect();
     let mut triangles = vec![0; touches.len()];
-    for &(voxel, triangle) in touches {
+    let place = |touch: usize| {
+        let (voxel, triangle) = touches[touch];
         let place = &mut next[touched.rank(voxel as usize)];
         triangles[*place as usize] = triangle;
         *place += 1;
-    }
+    };
+    pace.part(0.5..1.0).each(touches.len(), place).await;
     (cells, triangles)
 }
 

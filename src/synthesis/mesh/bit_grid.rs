@@ -1,0 +1,83 @@
+//! Voxels that are set, with their number before each: a list and its inverse in little more than a bit a voxel.
+
+use crate::synthesis::pace::{Pace, STRETCH};
+
+/// One bit per voxel, and the number of bits set before each.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct BitGrid {
+    words: Vec<u64>,
+    ranks: Vec<u32>,
+}
+
+impl BitGrid {
+    /// A grid in which the voxels are set that so many candidates turn out to be.
+    pub async fn new(len: usize, candidates: usize, set: impl Fn(usize) -> Option<usize>, pace: &Pace) -> Self {
+        let mut words = vec![0u64; len.div_ceil(64)];
+        let add = |candidate: usize| {
+            if let Some(voxel) = set(candidate) {
+                words[voxel / 64] |= 1 << (voxel % 64);
+            }
+        };
+        pace.each(candidates, add).await;
+        let mut before = 0;
+        let ranks = words.iter().map(|word| {
+            let rank = before;
+            before += word.count_ones();
+            rank
+        });
+        Self { ranks: ranks.collect(), words }
+    }
+
+    /// Whether a voxel is set.
+    pub fn contains(&self, voxel: usize) -> bool {
+        self.words[voxel / 64] >> (voxel % 64) & 1 == 1
+    }
+
+    /// How many voxels before this one are set.
+    pub fn rank(&self, voxel: usize) -> usize {
+        let below = self.words[voxel / 64] & ((1u64 << (voxel % 64)) - 1);
+        self.ranks[voxel / 64] as usize + below.count_ones() as usize
+    }
+
+    /// The voxels that are set as a list, in order.
+    pub async fn list(&self, pace: &Pace) -> Vec<u32> {
+        let mut list = Vec::new();
+        let mut left = self.iter().map(|voxel| voxel as u32).peekable();
+        while let Some(&next) = left.peek() {
+            list.extend(left.by_ref().take(STRETCH));
+            pace.rest(next as f32 / (64 * self.words.len()) as f32).await;
+        }
+        list
+    }
+
+    /// The voxels that are set, in order.
+    pub fn iter(&self) -> impl Iterator<Item = usize> {
+        self.words.iter().enumerate().flat_map(|(index, &word)| {
+            let mut left = word;
+            std::iter::from_fn(move || {
+                let bit = (left != 0).then(|| left.trailing_zeros() as usize)?;
+                left &= left - 1;
+                Some(index * 64 + bit)
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesis::pace::at_once;
+
+    #[test]
+    fn bits_are_counted_and_listed() {
+        let set = [0usize, 1, 63, 64, 70, 129];
+        let bits = at_once(BitGrid::new(130, set.len(), |index| Some(set[index]), &Pace::default()));
+        assert_eq!(bits.iter().collect::<Vec<_>>(), set);
+        for (rank, voxel) in set.into_iter().enumerate() {
+            assert!(bits.contains(voxel));
+            assert_eq!(bits.rank(voxel), rank);
+        }
+        assert!(!bits.contains(2) && !bits.contains(128));
+        assert_eq!(bits.rank(128), 5);
+    }
+}
