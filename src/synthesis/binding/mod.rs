@@ -20,6 +20,7 @@ mod vertices;
 
 use crate::synthesis::{
     mesh::{TetMesh, TriangleMesh},
+    pace::{Pace, at_once},
     tree::VesselTree,
 };
 use bevy_math::Vec3;
@@ -83,8 +84,14 @@ impl Binding {
     /// Of equally near triangles the first counts; degenerate ones are left out. Vertices at the same position count as
     /// one for normals, so that seams don't show.
     pub fn to_surface(tree: &VesselTree, mesh: &TriangleMesh) -> Self {
-        let mut binding = Self { bonds: Bonds::Surface(Box::new(SurfaceBonds::new(mesh))) };
-        binding.extend(tree);
+        at_once(Self::to_surface_paced(tree, mesh, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub async fn to_surface_paced(tree: &VesselTree, mesh: &TriangleMesh, pace: &Pace) -> Self {
+        let bonds = SurfaceBonds::new(mesh, &pace.part(0.0..0.3)).await;
+        let mut binding = Self { bonds: Bonds::Surface(Box::new(bonds)) };
+        binding.extend_paced(tree, &pace.part(0.3..1.0)).await;
         binding
     }
 
@@ -94,18 +101,28 @@ impl Binding {
     /// extrapolated: its weights leave the range from 0 to 1, and the farther outside it is, the more a tetrahedron's
     /// motion moves it.
     pub fn to_tetrahedra(tree: &VesselTree, mesh: &TetMesh) -> Self {
-        let mut binding = Self { bonds: Bonds::Solid(SolidBonds::new(mesh)) };
-        binding.extend(tree);
+        at_once(Self::to_tetrahedra_paced(tree, mesh, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub async fn to_tetrahedra_paced(tree: &VesselTree, mesh: &TetMesh, pace: &Pace) -> Self {
+        let mut binding = Self { bonds: Bonds::Solid(SolidBonds::new(mesh, &pace.part(0.0..0.3)).await) };
+        binding.extend_paced(tree, &pace.part(0.3..1.0)).await;
         binding
     }
 
     /// Binds the nodes that were appended to the tree since the last call. The tree is to be at rest, as its beginning
     /// was. A tree with fewer nodes than are bound is taken for another one, and bound from the beginning.
     pub fn extend(&mut self, tree: &VesselTree) {
+        at_once(self.extend_paced(tree, &Pace::default()));
+    }
+
+    /// The same, with rests.
+    pub async fn extend_paced(&mut self, tree: &VesselTree, pace: &Pace) {
         let bound = if tree.len() < self.len() { 0 } else { self.len() };
         match &mut self.bonds {
-            Bonds::Surface(bonds) => bonds.bind(bound, tree.positions()),
-            Bonds::Solid(bonds) => bonds.bind(bound, tree.positions()),
+            Bonds::Surface(bonds) => bonds.bind(bound, tree.positions(), pace).await,
+            Bonds::Solid(bonds) => bonds.bind(bound, tree.positions(), pace).await,
         }
     }
 

@@ -7,9 +7,11 @@ use super::{
 };
 use crate::synthesis::{
     mesh::{TriangleIndex, TriangleMesh, doubled_normal, unit},
+    pace::{Pace, SHORT_STRETCH},
     parallel,
 };
 use bevy_math::{Vec3, Vec3A, Vec4};
+use std::ops::Range;
 
 /// Length of an offset, relative to the size of the coordinates, below which a node lies on the surface: a few
 /// roundings. Such nodes need no frame.
@@ -99,11 +101,11 @@ pub(super) struct SurfaceBonds {
 }
 
 impl SurfaceBonds {
-    pub fn new(mesh: &TriangleMesh) -> Self {
-        let (mut measured, mut rest) = (Vertices::new(mesh), Vec::new());
+    pub async fn new(mesh: &TriangleMesh, pace: &Pace) -> Self {
+        let (mut measured, mut rest) = (Vertices::new(mesh, &pace.part(0.0..0.3)).await, Vec::new());
         let rest_scale = measured.measure(mesh.positions(), &mut rest);
         Self {
-            index: TriangleIndex::new(mesh),
+            index: TriangleIndex::new_paced(mesh, &pace.part(0.3..1.0)).await,
             mesh: mesh.clone(),
             measured,
             bonds: Vec::new(),
@@ -122,14 +124,17 @@ impl SurfaceBonds {
     }
 
     /// Binds the nodes from a number on.
-    pub fn bind(&mut self, from: usize, nodes: &[Vec3]) {
+    pub async fn bind(&mut self, from: usize, nodes: &[Vec3], pace: &Pace) {
         self.bonds.truncate(from);
-        for &node in &nodes[from..] {
-            let found = self.index.closest(node).expect("nodes are finite, and a mesh has a triangle with an area");
-            let bond =
-                bond(&self.rest, self.rest_scale, self.mesh.triangles()[found.triangle], found.barycentric, node);
-            self.bonds.push(bond);
-        }
+        let nodes = &nodes[from..];
+        let bind = |stretch: Range<usize>| {
+            for &node in &nodes[stretch] {
+                let found = self.index.closest(node).expect("nodes are finite, and a mesh has a triangle with an area");
+                let corners = self.mesh.triangles()[found.triangle];
+                self.bonds.push(bond(&self.rest, self.rest_scale, corners, found.barycentric, node));
+            }
+        };
+        pace.stretches(nodes.len(), SHORT_STRETCH, bind).await;
     }
 
     pub fn follow(&mut self, positions: &[Vec3], moved: &mut [Vec3]) {

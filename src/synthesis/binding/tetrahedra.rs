@@ -3,10 +3,12 @@
 use super::WORTH_SHARING;
 use crate::synthesis::{
     mesh::{TetMesh, tet_mesh::edges, triangle_index::closest_on_triangle},
+    pace::{Pace, SHORT_STRETCH},
     parallel,
     space::bvh::{Bounds, BoxTree},
 };
 use bevy_math::{DVec3, Vec3};
+use std::ops::Range;
 
 /// A point's weights for the last three corners of a tetrahedron; the four sum to 1.
 fn weights(point: Vec3, corners: [Vec3; 4]) -> DVec3 {
@@ -34,20 +36,32 @@ struct Bond {
 
 #[derive(Clone, Debug)]
 pub(super) struct SolidBonds {
+    elements: Elements,
+    bonds: Vec<Bond>,
+}
+
+/// The tetrahedra at rest, with an index over them.
+#[derive(Clone, Debug)]
+struct Elements {
     mesh: TetMesh,
     tree: BoxTree,
     /// Number of each slot's tetrahedron.
     tetrahedra: Vec<u32>,
-    bonds: Vec<Bond>,
 }
 
 impl SolidBonds {
-    pub fn new(mesh: &TetMesh) -> Self {
-        let numbers: Vec<u32> =
-            (0..mesh.tetrahedra().len() as u32).filter(|&number| !mesh.is_degenerate(number as usize)).collect();
-        let tree = BoxTree::new(numbers.iter().map(|&number| Bounds::around(&mesh.corners(number as usize))));
+    pub async fn new(mesh: &TetMesh, pace: &Pace) -> Self {
+        let mut numbers: Vec<u32> = Vec::with_capacity(mesh.tetrahedra().len());
+        let take = |number: usize| {
+            if !mesh.is_degenerate(number) {
+                numbers.push(number as u32);
+            }
+        };
+        pace.part(0.0..0.1).each(mesh.tetrahedra().len(), take).await;
+        let bounds = |id: usize| Bounds::around(&mesh.corners(numbers[id] as usize));
+        let tree = BoxTree::new_paced(numbers.len(), bounds, &pace.part(0.1..1.0)).await;
         let tetrahedra = tree.order().iter().map(|&id| numbers[id as usize]).collect();
-        Self { mesh: mesh.clone(), tree, tetrahedra, bonds: Vec::new() }
+        Self { elements: Elements { mesh: mesh.clone(), tree, tetrahedra }, bonds: Vec::new() }
     }
 
     pub fn len(&self) -> usize {
@@ -55,19 +69,33 @@ impl SolidBonds {
     }
 
     pub fn vertices(&self) -> usize {
-        self.mesh.positions().len()
+        self.elements.mesh.positions().len()
     }
 
     /// Binds the nodes from a number on.
-    pub fn bind(&mut self, from: usize, nodes: &[Vec3]) {
+    pub async fn bind(&mut self, from: usize, nodes: &[Vec3], pace: &Pace) {
         self.bonds.truncate(from);
-        for &node in &nodes[from..] {
-            let tetrahedron = self.nearest(node);
-            let weights = weights(node, self.mesh.corners(tetrahedron)).as_vec3();
-            self.bonds.push(Bond { corners: self.mesh.tetrahedra()[tetrahedron], weights });
-        }
+        let Self { elements, bonds } = self;
+        let nodes = &nodes[from..];
+        let bind = |stretch: Range<usize>| {
+            for &node in &nodes[stretch] {
+                let tetrahedron = elements.nearest(node);
+                let weights = weights(node, elements.mesh.corners(tetrahedron)).as_vec3();
+                bonds.push(Bond { corners: elements.mesh.tetrahedra()[tetrahedron], weights });
+            }
+        };
+        pace.stretches(nodes.len(), SHORT_STRETCH, bind).await;
     }
 
+    pub fn follow(&self, vertices: &[Vec3], positions: &mut [Vec3]) {
+        parallel::map_all(&self.bonds, positions, WORTH_SHARING, |_, bond| {
+            let [a, b, c, d] = bond.corners.map(|corner| vertices[corner as usize]);
+            a + (b - a) * bond.weights.x + (c - a) * bond.weights.y + (d - a) * bond.weights.z
+        });
+    }
+}
+
+impl Elements {
     /// The first of the tetrahedra nearest to a point.
     fn nearest(&self, point: Vec3) -> usize {
         let mut found = (f64::INFINITY, u32::MAX);
@@ -81,12 +109,5 @@ impl SolidBonds {
             offer.0 as f32
         });
         found.1 as usize
-    }
-
-    pub fn follow(&self, vertices: &[Vec3], positions: &mut [Vec3]) {
-        parallel::map_all(&self.bonds, positions, WORTH_SHARING, |_, bond| {
-            let [a, b, c, d] = bond.corners.map(|corner| vertices[corner as usize]);
-            a + (b - a) * bond.weights.x + (c - a) * bond.weights.y + (d - a) * bond.weights.z
-        });
     }
 }

@@ -6,7 +6,7 @@
 
 use super::WORTH_SHARING;
 use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
-use crate::synthesis::parallel;
+use crate::synthesis::{pace::Pace, parallel};
 use bevy_math::{Vec3, Vec3A};
 
 /// A vertex of a deformed organ. Position and normal lie side by side: a node asks for both, anywhere in the mesh.
@@ -33,13 +33,16 @@ pub(super) struct Vertices {
 }
 
 impl Vertices {
-    pub fn new(mesh: &TriangleMesh) -> Self {
-        let welding = mesh.weld();
+    pub async fn new(mesh: &TriangleMesh, pace: &Pace) -> Self {
+        let welding = mesh.weld_paced(&pace.part(0.0..0.5)).await;
         let triangles = mesh.triangles().to_vec();
         let mut ranges = vec![[0; 2]; welding.count()];
-        for &corner in triangles.as_flattened() {
-            ranges[welding.vertex(corner)][1] += 1;
-        }
+        let count = |triangle: usize| {
+            for corner in triangles[triangle] {
+                ranges[welding.vertex(corner)][1] += 1;
+            }
+        };
+        pace.part(0.5..0.7).each(triangles.len(), count).await;
         let mut end = 0;
         for range in &mut ranges {
             let count = range[1];
@@ -47,13 +50,14 @@ impl Vertices {
             end += count;
         }
         let mut around = vec![0; 3 * triangles.len()];
-        for (triangle, corners) in (0..).zip(&triangles) {
-            for &corner in corners {
+        let enter = |triangle: usize| {
+            for corner in triangles[triangle] {
                 let [_, end] = &mut ranges[welding.vertex(corner)];
-                around[*end as usize] = triangle;
+                around[*end as usize] = triangle as u32;
                 *end += 1;
             }
-        }
+        };
+        pace.part(0.7..1.0).each(triangles.len(), enter).await;
         let areas = vec![Vec3A::ZERO; triangles.len()];
         let normals = vec![Vec3A::ZERO; welding.count()];
         Self { triangles, welding, ranges, around, areas, normals }
@@ -98,6 +102,7 @@ fn scale_to_one(positions: &[Vec3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::synthesis::pace::at_once;
     use bevy_math::Quat;
 
     /// A fan around a tip, every triangle with corners of its own.
@@ -113,7 +118,7 @@ mod tests {
         for size in [1.0e-9, 1.0e-3, 1.0, 7.0e8] {
             let mesh = fan(size);
             let mut vertices = Vec::new();
-            Vertices::new(&mesh).measure(mesh.positions(), &mut vertices);
+            at_once(Vertices::new(&mesh, &Pace::default())).measure(mesh.positions(), &mut vertices);
             for (vertex, expected) in vertices.iter().zip(mesh.vertex_normals()) {
                 assert!((Vec3::from(vertex.normal) - expected).length() < 1.0e-6, "size {size}: {}", vertex.normal);
             }

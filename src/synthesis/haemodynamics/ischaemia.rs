@@ -4,11 +4,14 @@
 //! intact network: 1 where nothing has changed, 0 below a clamp. The supply of a vertex is that of the terminals next to
 //! it. A simulator colours by it, and scores how much tissue is left without.
 
-use crate::synthesis::haemodynamics::{FlowError, Network};
-use crate::synthesis::tree::{NO_PARENT, VesselTree};
+use crate::synthesis::{
+    haemodynamics::{FlowError, Network},
+    pace::{Pace, SHORT_STRETCH, at_once},
+    space::{morton::Curve, packed_boxes::PackedBoxes},
+    tree::{NO_PARENT, VesselTree},
+};
 use bevy_math::Vec3;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use std::num::NonZeroUsize;
+use std::ops::Range;
 
 /// The supply of every segment of a tree.
 #[derive(Clone, Debug, Default)]
@@ -44,7 +47,15 @@ impl Supply {
     /// # Panics
     /// When the network is of another tree.
     pub fn against(tree: &VesselTree, intact: &Network) -> Self {
-        let mut flows: Vec<f64> = (0..tree.len()).map(|node| intact.bed_flow(node)).collect();
+        at_once(Self::against_paced(tree, intact, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Panics
+    /// When the network is of another tree.
+    pub async fn against_paced(tree: &VesselTree, intact: &Network, pace: &Pace) -> Self {
+        let mut flows: Vec<f64> = pace.collect(tree.len(), |node| intact.bed_flow(node)).await;
         tree.fold_to_roots(&mut flows, |parent, child| *parent += child);
         Self { intact: flows, segments: vec![1.0; tree.len()], ..Self::default() }
     }
@@ -57,15 +68,26 @@ impl Supply {
     /// # Panics
     /// When tree or network have another number of nodes than when this was made.
     pub fn update(&mut self, tree: &VesselTree, network: &Network) {
-        assert_eq!(self.intact.len(), network.len(), "one network, that the supply was made for");
-        self.sums.clear();
+        at_once(self.update_paced(tree, network, &Pace::default()));
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Panics
+    /// When tree or network have another number of nodes than when this was made.
+    pub async fn update_paced(&mut self, tree: &VesselTree, network: &Network, pace: &Pace) {
+        let Self { intact, sums, segments } = self;
+        assert_eq!(intact.len(), network.len(), "one network, that the supply was made for");
+        sums.clear();
         // Veins drain: their flows are negative throughout.
-        let forwards = |node: usize| network.bed_flow(node) * self.intact[node].signum();
-        self.sums.extend((0..tree.len()).map(|node| forwards(node).max(0.0)));
-        tree.fold_to_roots(&mut self.sums, |parent, child| *parent += child);
-        for ((segment, &sum), &intact) in self.segments.iter_mut().zip(&self.sums).zip(&self.intact) {
-            *segment = if intact == 0.0 { 1.0 } else { (sum / intact.abs()).min(1.0) as f32 };
-        }
+        let forwards = |node: usize| network.bed_flow(node) * intact[node].signum();
+        pace.part(0.0..0.5).each(tree.len(), |node| sums.push(forwards(node).max(0.0))).await;
+        tree.fold_to_roots(sums, |parent, child| *parent += child);
+        let share = |node: usize| {
+            let intact = intact[node];
+            segments[node] = if intact == 0.0 { 1.0 } else { (sums[node] / intact.abs()).min(1.0) as f32 };
+        };
+        pace.part(0.5..1.0).each(tree.len(), share).await;
     }
 
     /// Supply of every segment, from 0 to 1, by the node that it ends in.
@@ -91,6 +113,48 @@ impl Supply {
     }
 }
 
+/// The terminals of a tree, and an index over where they are.
+struct Terminals {
+    boxes: PackedBoxes,
+    /// Node and position of each slot.
+    slots: Vec<(u32, Vec3)>,
+}
+
+impl Terminals {
+    async fn of(tree: &VesselTree, pace: &Pace) -> Self {
+        let mut nodes = tree.tips();
+        nodes.retain(|&node| tree.parents()[node as usize] != NO_PARENT);
+        let at = |node: u32| tree.positions()[node as usize];
+        let curve = Curve::around(nodes.iter().map(|&node| at(node)), 1.0);
+        let place = |number: usize| (curve.key(at(nodes[number])), nodes[number]);
+        let mut places: Vec<(u64, u32)> = pace.part(0.0..0.2).collect(nodes.len(), place).await;
+        pace.part(0.2..0.6).sort(&mut places).await;
+        let slots: Vec<(u32, Vec3)> = places.into_iter().map(|(_, node)| (node, at(node))).collect();
+        let boxes = PackedBoxes::new(slots.len(), |slot| (slots[slot].1, slots[slot].1), &pace.part(0.6..1.0)).await;
+        Self { boxes, slots }
+    }
+
+    /// The terminals nearest to a point by squared distance, the nearest first; of equally near ones, those of the lower
+    /// nodes. Infinitely far where there is none, and for a point that is not finite.
+    fn nearest(&self, point: Vec3) -> [(f32, u32); TissueSupply::NEAREST] {
+        let mut found = [(f32::INFINITY, u32::MAX); TissueSupply::NEAREST];
+        if point.is_finite() {
+            let visit = |slot: usize, _: f32| {
+                let (node, position) = self.slots[slot];
+                let mut offer = (position.distance_squared(point), node);
+                for place in &mut found {
+                    if offer < *place {
+                        std::mem::swap(&mut offer, place);
+                    }
+                }
+                found[TissueSupply::NEAREST - 1].0
+            };
+            self.boxes.best_first(f32::INFINITY, |pack| pack.distances_squared(point), visit);
+        }
+        found
+    }
+}
+
 /// Which terminals supply every vertex of an organ, and how much.
 ///
 /// Built once for a tree and a mesh; then each update is a gather.
@@ -111,29 +175,29 @@ impl TissueSupply {
     /// terminals supplies no vertex, and a vertex that is not finite has no neighbours: both count as supplied, having
     /// nothing to lose.
     pub fn new(tree: &VesselTree, vertices: &[Vec3]) -> Self {
-        let terminals: Vec<u32> =
-            tree.tips().into_iter().filter(|&node| tree.parents()[node as usize] != NO_PARENT).collect();
-        let none =
+        at_once(Self::new_paced(tree, vertices, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub async fn new_paced(tree: &VesselTree, vertices: &[Vec3], pace: &Pace) -> Self {
+        let terminals = Terminals::of(tree, &pace.part(0.0..0.2)).await;
+        let mut supply =
             Self { sources: vec![[(0, 0.0); Self::NEAREST]; vertices.len()], vertices: vec![1.0; vertices.len()] };
-        let points: Vec<[f32; 3]> = terminals.iter().map(|&node| tree.positions()[node as usize].to_array()).collect();
-        if points.is_empty() {
-            return none;
-        }
-        // Fails only on more points than a u32 counts, which no tree holds.
-        let Ok(index) = ImmutableKdTree::<f32, 3>::new_from_slice(&points) else { return none };
-        let Some(nearest) = NonZeroUsize::new(Self::NEAREST.min(points.len())) else { return none };
-        let mut supply = none;
-        for (sources, vertex) in supply.sources.iter_mut().zip(vertices).filter(|(_, vertex)| vertex.is_finite()) {
-            let query = vertex.to_array();
-            let found = index.query(&query).nearest_n::<SquaredEuclidean<f32>>(nearest).execute();
-            let farthest = found.iter().map(|near| near.distance).fold(0.0, f32::max);
-            // Where a vertex lies on a terminal, that one supplies it nearly alone.
-            let weight = |distance: f32| 1.0 / (distance + 1e-6 * farthest).max(f32::MIN_POSITIVE);
-            let total: f64 = found.iter().map(|near| f64::from(weight(near.distance))).sum();
-            for (source, near) in sources.iter_mut().zip(&found) {
-                *source = (terminals[near.item as usize], (f64::from(weight(near.distance)) / total) as f32);
+        let sources = &mut supply.sources;
+        let find = |stretch: Range<usize>| {
+            for (sources, &vertex) in sources[stretch.clone()].iter_mut().zip(&vertices[stretch]) {
+                let found = terminals.nearest(vertex);
+                let found = found.iter().filter(|(distance, _)| distance.is_finite());
+                let farthest = found.clone().map(|&(distance, _)| distance).fold(0.0, f32::max);
+                // Where a vertex lies on a terminal, that one supplies it nearly alone.
+                let weight = |distance: f32| 1.0 / (distance + 1e-6 * farthest).max(f32::MIN_POSITIVE);
+                let total: f64 = found.clone().map(|&(distance, _)| f64::from(weight(distance))).sum();
+                for (source, &(distance, node)) in sources.iter_mut().zip(found) {
+                    *source = (node, (f64::from(weight(distance)) / total) as f32);
+                }
             }
-        }
+        };
+        pace.part(0.2..1.0).stretches(vertices.len(), SHORT_STRETCH, find).await;
         supply
     }
 

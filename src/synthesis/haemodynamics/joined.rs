@@ -17,7 +17,10 @@
 //! the pool's. Open ends are solved for by Newton's method around it, as in a single tree.
 
 use super::{FlowError, Network, open_ends::OpenEnds, side::Side};
-use crate::synthesis::tree::BedLink;
+use crate::synthesis::{
+    pace::{Pace, at_once},
+    tree::BedLink,
+};
 
 /// Arteries and veins of an organ, joined through the bed.
 #[derive(Clone, Debug)]
@@ -51,13 +54,26 @@ impl Circulation {
     ///
     /// # Errors
     /// When a node is not of its network, or the arteries' bed has no resistance.
-    pub fn new(arterial: Network, mut venous: Network, links: &[BedLink]) -> Result<Self, FlowError> {
+    pub fn new(arterial: Network, venous: Network, links: &[BedLink]) -> Result<Self, FlowError> {
+        at_once(Self::new_paced(arterial, venous, links, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub async fn new_paced(
+        arterial: Network,
+        mut venous: Network,
+        links: &[BedLink],
+        pace: &Pace,
+    ) -> Result<Self, FlowError> {
         let resistance = arterial.settings.bed.resistance.ok_or(FlowError::BedWithoutResistance)?;
         venous.settings.bed.resistance = Some(resistance);
-        venous.set_beds();
+        venous.set_beds(&pace.part(0.0..0.3)).await;
         let conductance = 1.0 / resistance.pascal_seconds_per_cubic_metre();
         let mut circulation = Self { arterial, venous, links: 0, conductance, passes: 0, sides: Default::default() };
-        circulation.set_links(links)?;
+        circulation.set_links_paced(links, &pace.part(0.3..1.0)).await?;
         Ok(circulation)
     }
 
@@ -66,14 +82,18 @@ impl Circulation {
     /// # Errors
     /// When a node is not of its network. The links are as before, then.
     pub fn set_links(&mut self, links: &[BedLink]) -> Result<(), FlowError> {
+        at_once(self.set_links_paced(links, &Pace::default()))
+    }
+
+    async fn set_links_paced(&mut self, links: &[BedLink], pace: &Pace) -> Result<(), FlowError> {
         for link in links {
             self.arterial.check(link.arterial)?;
             self.venous.check(link.venous)?;
         }
         self.sides =
             [Side::new(links.iter().map(|link| link.arterial)), Side::new(links.iter().map(|link| link.venous))];
-        self.arterial.set_links(links.iter().map(|link| link.arterial));
-        self.venous.set_links(links.iter().map(|link| link.venous));
+        self.arterial.set_links(links.iter().map(|link| link.arterial), &pace.part(0.0..0.5)).await;
+        self.venous.set_links(links.iter().map(|link| link.venous), &pace.part(0.5..1.0)).await;
         self.links = links.len();
         Ok(())
     }
@@ -111,7 +131,7 @@ impl Circulation {
     /// Gives the two networks back, apart again.
     pub fn into_networks(mut self) -> [Network; 2] {
         for network in [&mut self.arterial, &mut self.venous] {
-            network.set_links(std::iter::empty());
+            at_once(network.set_links(std::iter::empty(), &Pace::default()));
         }
         [self.arterial, self.venous]
     }
@@ -125,20 +145,29 @@ impl Circulation {
     /// # Errors
     /// When one of the iterations did not converge.
     pub fn solve(&mut self) -> Result<(), FlowError> {
+        at_once(self.solve_paced(&Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`solve`](Self::solve).
+    pub async fn solve_paced(&mut self, pace: &Pace) -> Result<(), FlowError> {
         self.share_bed_pressure();
         self.passes = 0;
         let has_ends = [&self.arterial, &self.venous].iter().any(|network| !network.ends.all().is_empty());
-        self.sides[0].prepare(&mut self.arterial);
-        self.sides[1].prepare(&mut self.venous);
+        self.sides[0].prepare(&mut self.arterial, &pace.part(0.0..0.2)).await;
+        self.sides[1].prepare(&mut self.venous, &pace.part(0.2..0.4)).await;
+        let (balancing, driving) = (pace.part(0.4..0.7), pace.part(0.7..1.0));
         let mut residual = f64::INFINITY;
         let mut accuracy = if has_ends { Self::FIRST_ACCURACY } else { Self::ACCURACY };
         for round in 0..Self::MOST_ROUNDS {
             for network in [&mut self.arterial, &mut self.venous] {
                 network.linearise_ends();
             }
-            self.balance(accuracy)?;
+            self.balance(accuracy, &balancing).await?;
             if !has_ends {
-                self.drive();
+                self.drive(&driving).await;
                 return Ok(());
             }
             let damped = round >= Self::UNDAMPED;
@@ -146,7 +175,7 @@ impl Circulation {
             residual = self.arterial.accept_ends(&arteries.quotient, damped);
             residual = residual.max(self.venous.accept_ends(&veins.quotient, damped));
             if residual <= 1.0 && accuracy == Self::ACCURACY {
-                return self.finish();
+                return self.finish(&driving).await;
             }
             // Newton's method squares the error, so that a round needs to be no more exact than that. Ends that let out
             // very little ask for more.
@@ -166,21 +195,21 @@ impl Circulation {
     }
 
     /// Turns the ends' tangents into what they draw, and solves with that once more.
-    fn finish(&mut self) -> Result<(), FlowError> {
+    async fn finish(&mut self, pace: &Pace) -> Result<(), FlowError> {
         let [arteries, veins] = &self.sides;
         self.arterial.finish_ends(&arteries.quotient);
         self.venous.finish_ends(&veins.quotient);
-        self.balance(Self::ACCURACY)?;
-        self.drive();
+        self.balance(Self::ACCURACY, &pace.part(0.0..0.0)).await?;
+        self.drive(pace).await;
         Ok(())
     }
 
     /// Finds the pressures at links and open ends, with the ends as they are linearised.
-    fn balance(&mut self, accuracy: f64) -> Result<(), FlowError> {
+    async fn balance(&mut self, accuracy: f64, pace: &Pace) -> Result<(), FlowError> {
         self.sides[0].quotient.eliminate(&self.arterial.ends);
         self.sides[1].quotient.eliminate(&self.venous.ends);
         let (mut pressures, residual, tolerated) = self.begin_from_last(accuracy);
-        self.passes += self.descend(&mut pressures, residual, &tolerated)?;
+        self.passes += self.descend(&mut pressures, residual, &tolerated, pace).await?;
         let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
         let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
         veins.carry(arteries, *conductance, &pressures, &mut into_veins);
@@ -191,14 +220,14 @@ impl Circulation {
     }
 
     /// Solves both networks as a whole, from the pressures at the links.
-    fn drive(&mut self) {
+    async fn drive(&mut self, pace: &Pace) {
         let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
         let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
         veins.carry(arteries, *conductance, &arteries.pressures, &mut into_veins);
-        veins.drive(venous, &into_veins);
+        veins.drive(venous, &into_veins, &pace.part(0.0..0.5)).await;
         let pressures: Vec<f64> = veins.slots.iter().map(|&slot| venous.slots[slot as usize].pressure).collect();
         arteries.carry(veins, *conductance, &pressures, &mut into_arteries);
-        arteries.drive(arterial, &into_arteries);
+        arteries.drive(arterial, &into_arteries, &pace.part(0.5..1.0)).await;
     }
 
     /// Solves each tree once from the last solution. Returns the arterial pressures at the links, the imbalance left
@@ -221,11 +250,12 @@ impl Circulation {
     }
 
     /// Conjugate gradients on the arterial pressures at the links. Returns the number of passes.
-    fn descend(
+    async fn descend(
         &mut self,
         pressures: &mut [f64],
         mut residual: Vec<f64>,
         tolerated: &Tolerated,
+        pace: &Pace,
     ) -> Result<usize, FlowError> {
         let Self { arterial, sides: [arteries, veins], conductance, .. } = self;
         let (mut z, mut carried) = (vec![0.0; residual.len()], vec![0.0; residual.len()]);
@@ -236,6 +266,7 @@ impl Circulation {
         let mut product = dot(&residual, &z);
         let mut passes = 0;
         while largest(&residual) > tolerated.flow || largest(&z) > tolerated.pressure {
+            pace.rest(0.0).await;
             veins.carry(arteries, *conductance, &direction, &mut into_veins);
             veins.respond(&into_veins, &mut answer);
             arteries.carry(veins, *conductance, &answer, &mut carried);

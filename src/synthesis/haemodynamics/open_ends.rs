@@ -5,6 +5,7 @@ use super::{
     network::{Shunt, node_slot},
     skeleton::Skeleton,
 };
+use crate::synthesis::pace::{Pace, at_once};
 use crate::synthesis::tree::NodeId;
 use crate::synthesis::units::{BLOOD_DENSITY, Flow, Pressure, Scale};
 use std::ops::Range;
@@ -344,7 +345,8 @@ impl Network {
             return;
         }
         let mut skeleton = std::mem::take(&mut self.ends.skeleton);
-        skeleton.trace(self, self.ends.list.iter().map(|end| end.attached));
+        let attached = self.ends.list.iter().map(|end| end.attached);
+        at_once(skeleton.trace(self, attached, &Pace::default()));
         self.ends.skeleton = skeleton;
         for end in &mut self.ends.list {
             end.joint = self.ends.skeleton.joint_at(end.attached);

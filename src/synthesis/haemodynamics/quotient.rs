@@ -4,6 +4,7 @@
 //! into them, at the cost of the joints alone: two for each link or end at most, however large the tree.
 
 use super::{Network, open_ends::OpenEnds, skeleton::Skeleton};
+use crate::synthesis::pace::Pace;
 
 /// A joint with all below it eliminated.
 #[derive(Clone, Copy, Debug)]
@@ -29,10 +30,10 @@ pub(super) struct Quotient {
 
 impl Quotient {
     /// Traces the tree again, after it changed or was cut, or other nodes were linked.
-    pub fn trace(&mut self, network: &mut Network, linked: &[u32]) {
-        network.sum_all();
+    pub async fn trace(&mut self, network: &mut Network, linked: &[u32], pace: &Pace) {
+        network.sum_all(&pace.part(0.0..0.5)).await;
         let ends = network.ends.all().iter().map(|end| end.attached);
-        self.skeleton.trace(network, linked.iter().copied().chain(ends));
+        self.skeleton.trace(network, linked.iter().copied().chain(ends), &pace.part(0.5..1.0)).await;
     }
 
     /// The joint of a slot that is linked, or that an end is attached to.

@@ -5,7 +5,7 @@ use super::{
     network::{SOURCE, node_slot},
     quotient::Quotient,
 };
-use crate::synthesis::tree::NodeId;
+use crate::synthesis::{pace::Pace, tree::NodeId};
 
 /// The nodes of one network that links end in, and its answer to currents into them.
 #[derive(Clone, Debug, Default)]
@@ -34,9 +34,9 @@ impl Side {
     }
 
     /// Traces the network where it has changed, and takes the pressures of its last solution.
-    pub fn prepare(&mut self, network: &mut Network) {
+    pub async fn prepare(&mut self, network: &mut Network, pace: &Pace) {
         if self.traced != Some(network.revision) {
-            self.quotient.trace(network, &self.slots);
+            self.quotient.trace(network, &self.slots, pace).await;
             self.joints = self.slots.iter().map(|&slot| self.quotient.joint_at(slot)).collect();
             self.traced = Some(network.revision);
         }
@@ -92,14 +92,14 @@ impl Side {
     }
 
     /// Sets what the links bring, and solves the network with its ends as they are loaded.
-    pub fn drive(&self, network: &mut Network, currents: &[f64]) {
+    pub async fn drive(&self, network: &mut Network, currents: &[f64], pace: &Pace) {
         for (&slot, &current) in self.slots.iter().zip(currents) {
             network.beds[slot as usize].s = current;
             network.shunts[slot as usize] = network.beds[slot as usize];
         }
         network.load_stumps();
-        network.sum_all();
-        network.spread_pressures();
+        network.sum_all(&pace.part(0.0..0.5)).await;
+        network.spread_pressures(&pace.part(0.5..1.0)).await;
         // What changes from here on makes a later solution of this network alone begin anew.
         network.sums_stale = true;
         network.ends.is_untraced = true;
@@ -108,20 +108,18 @@ impl Side {
 
 impl Network {
     /// Joins nodes to another network, in place of those that were: each as often as it is named. All are there.
-    pub(super) fn set_links(&mut self, nodes: impl Iterator<Item = NodeId>) {
+    pub(super) async fn set_links(&mut self, nodes: impl Iterator<Item = NodeId>, pace: &Pace) {
         self.link_counts.clear();
         self.link_counts.resize(self.len(), 0);
         for node in nodes {
             self.link_counts[node.index()] += 1;
         }
-        self.set_beds();
+        self.set_beds(pace).await;
     }
 
     /// Sets what all nodes drain into.
-    pub(super) fn set_beds(&mut self) {
-        for node in 0..self.len() {
-            self.set_bed(node);
-        }
+    pub(super) async fn set_beds(&mut self, pace: &Pace) {
+        pace.each(self.len(), |node| self.set_bed(node)).await;
         self.sums_stale = true;
         self.revision += 1;
         self.ends.is_untraced = true;

@@ -9,6 +9,7 @@ use super::{
     Network,
     network::{REFERENCE, SOURCE, Shunt},
 };
+use crate::synthesis::pace::{Pace, Stretch};
 
 /// No joint.
 const NONE: u32 = u32::MAX;
@@ -77,12 +78,15 @@ impl Skeleton {
     const DUE: u32 = u32::MAX - 1;
 
     /// Traces the paths from the slots that ends are attached to. The sums of all slots off the paths must be right.
-    pub fn trace(&mut self, network: &Network, attached: impl Iterator<Item = u32>) {
+    pub async fn trace(&mut self, network: &Network, attached: impl Iterator<Item = u32>, pace: &Pace) {
         self.begin_trace(network.links.len());
-        let mut walks = Vec::new();
+        let (mut walks, mut stretch) = (Vec::new(), Stretch::default());
         for slot in attached {
             walks.push(self.active.len());
             self.walk(network, slot);
+            if stretch.ends_after(self.active.len() - walks[walks.len() - 1]) {
+                pace.rest(0.0).await;
+            }
         }
         // A later walk ends where it meets an earlier one, so that its slots lie below.
         let mut ordered = Vec::with_capacity(self.active.len());
@@ -98,6 +102,9 @@ impl Skeleton {
                 self.joint_of[slot as usize] = self.joints.len() as u32;
                 let joint = self.joint(network, slot);
                 self.joints.push(joint);
+            }
+            if stretch.ends_after(1) {
+                pace.rest(at as f32 / self.active.len() as f32).await;
             }
         }
         for joint in &mut self.joints {

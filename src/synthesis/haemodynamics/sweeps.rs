@@ -4,9 +4,12 @@ use super::{
     FlowError, Network,
     network::{FIRST, REFERENCE, SOURCE, Shunt, node_slot},
 };
-use crate::synthesis::tree::NodeId;
-use crate::synthesis::units::Pressure;
-use std::collections::BinaryHeap;
+use crate::synthesis::{
+    pace::{Pace, STRETCH, at_once},
+    tree::NodeId,
+    units::Pressure,
+};
+use std::{collections::BinaryHeap, ops::Range};
 
 impl Network {
     /// Brings pressures and flows of all nodes up to date.
@@ -14,8 +17,19 @@ impl Network {
     /// # Errors
     /// When the flow through the open ends did not converge.
     pub fn solve(&mut self) -> Result<(), FlowError> {
+        at_once(self.solve_paced(&Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`solve`](Self::solve).
+    pub async fn solve_paced(&mut self, pace: &Pace) -> Result<(), FlowError> {
+        if std::mem::take(&mut self.sums_stale) {
+            self.sum_all(&pace.part(0.0..0.5)).await;
+        }
         self.settle()?;
-        self.spread_pressures();
+        self.spread_pressures(&pace.part(0.5..1.0)).await;
         Ok(())
     }
 
@@ -38,7 +52,7 @@ impl Network {
     /// When it did not converge.
     pub fn solve_ends(&mut self) -> Result<(), FlowError> {
         if std::mem::take(&mut self.sums_stale) {
-            self.sum_all();
+            at_once(self.sum_all(&Pace::default()));
         }
         self.trace_ends();
         self.ends.solve(self.source, self.ambient(), self.bed)
@@ -68,18 +82,25 @@ impl Network {
     }
 
     /// Sums of all nodes, children in falling order of their index.
-    pub(super) fn sum_all(&mut self) {
-        for (slot, &shunt) in self.slots.iter_mut().zip(&self.shunts) {
-            slot.below = shunt;
-        }
-        for index in (FIRST..self.slots.len()).rev() {
-            let slot = &mut self.slots[index];
+    pub(super) async fn sum_all(&mut self, pace: &Pace) {
+        let Self { slots, shunts, links, .. } = self;
+        let load = |stretch: Range<usize>| {
+            for (slot, &shunt) in slots[stretch.clone()].iter_mut().zip(&shunts[stretch]) {
+                slot.below = shunt;
+            }
+        };
+        let count = shunts.len();
+        pace.part(0.0..0.2).stretches(count, STRETCH, load).await;
+        let sum = |number: usize| {
+            let index = count - 1 - number;
+            let slot = &mut slots[index];
             slot.through = 1.0 / (1.0 + slot.resistance * slot.below.y);
             let given = Shunt { y: slot.below.y * slot.through, s: slot.below.s * slot.through };
-            let upstream = &mut self.slots[self.links[index].upstream as usize].below;
+            let upstream = &mut slots[links[index].upstream as usize].below;
             upstream.y += given.y;
             upstream.s += given.s;
-        }
+        };
+        pace.part(0.2..1.0).each(count - FIRST, sum).await;
     }
 
     /// The sums of one node again, from its children, bit for bit as [`sum_all`](Self::sum_all) has them.
@@ -120,16 +141,17 @@ impl Network {
     }
 
     /// Pressures and flows of all nodes, from the sums.
-    pub(super) fn spread_pressures(&mut self) {
+    pub(super) async fn spread_pressures(&mut self, pace: &Pace) {
         self.slots[REFERENCE as usize].pressure = 0.0;
         self.slots[SOURCE as usize].pressure = self.source;
-        for index in FIRST..self.slots.len() {
-            let above = self.slots[self.links[index].upstream as usize].pressure;
-            let slot = &mut self.slots[index];
+        let spread = |node: usize| {
+            let above = self.slots[self.links[node + FIRST].upstream as usize].pressure;
+            let slot = &mut self.slots[node + FIRST];
             slot.pressure = slot.through * (above + slot.resistance * slot.below.s);
-            self.pressures[index - FIRST] = slot.pressure + self.bed;
-            self.flows[index - FIRST] = slot.through * (slot.below.y * above - slot.below.s);
-        }
+            self.pressures[node] = slot.pressure + self.bed;
+            self.flows[node] = slot.through * (slot.below.y * above - slot.below.s);
+        };
+        pace.each(self.radii.len(), spread).await;
         for &(node, _) in &self.interruptions {
             self.flows[node as usize] = 0.0;
         }
