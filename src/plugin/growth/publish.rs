@@ -35,7 +35,7 @@ use bevy::{
 pub(crate) struct PublishedVessels {
     vessels: &'static mut Vessels,
     changes: &'static mut SegmentChanges,
-    aabb: &'static mut Aabb,
+    aabb: Option<&'static mut Aabb>,
     index: Option<&'static mut VesselIndex>,
 }
 
@@ -107,7 +107,9 @@ impl PublishedVesselsItem<'_, '_> {
             index.note_moved(&self.vessels, changed);
         }
         let aabb = self.vessels.aabb();
-        self.aabb.set_if_neq(aabb);
+        if let Some(known) = &mut self.aabb {
+            known.set_if_neq(aabb);
+        }
     }
 }
 

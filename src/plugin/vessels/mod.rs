@@ -14,6 +14,7 @@ pub(crate) mod change_log;
 pub(crate) mod index;
 pub(crate) mod pick;
 pub(crate) mod relations;
+mod saved;
 pub(crate) mod tree;
 pub(crate) mod wounds;
 

@@ -1,6 +1,6 @@
 //! The tree of a vessel entity, kept up to date with a growth at the cost of what changed.
 
-use crate::plugin::vessels::change_log::SegmentChanges;
+use crate::plugin::vessels::{change_log::SegmentChanges, saved::clone_as_saved};
 use crate::synthesis::{
     binding::{Binding, BindingError},
     growth::GrownTree,
@@ -8,8 +8,9 @@ use crate::synthesis::{
 };
 use bevy::{
     camera::{primitives::Aabb, visibility::Visibility},
-    ecs::component::Component,
+    ecs::{component::Component, reflect::ReflectComponent},
     math::Vec3,
+    reflect::{Reflect, ReflectDeserialize, ReflectSerialize},
     transform::components::Transform,
 };
 use std::{
@@ -31,7 +32,11 @@ impl Lineage {
 
 /// The vessels of one kind of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
 /// off its surface where the settings say so.
-#[derive(Component, Clone, Debug)]
+///
+/// Scenes and clones of the entity keep a given tree, but not one that grew: that grows again from mesh, settings and seed.
+#[derive(Component, Clone, Debug, Reflect)]
+#[component(clone_behavior = Custom(clone_as_saved))]
+#[reflect(opaque, Component, Clone(Vessels::as_saved), Debug, PartialEq, Serialize, Deserialize)]
 #[require(SegmentChanges, Transform, Visibility)]
 pub struct Vessels {
     kind: VesselKind,
@@ -45,6 +50,10 @@ pub struct Vessels {
     bounds: Option<(Vec3, Vec3)>,
     /// Positions at rest, while the organ is deformed.
     rest: Option<Vec<Vec3>>,
+    /// Whether the tree is that of a growth.
+    is_grown: bool,
+    /// Hash of the tree that they were saved with.
+    saved_hash: Option<u64>,
 }
 
 impl Vessels {
@@ -59,6 +68,8 @@ impl Vessels {
             next_siblings: Vec::new(),
             bounds: None,
             rest: None,
+            is_grown: true,
+            saved_hash: None,
         }
     }
 
@@ -69,7 +80,7 @@ impl Vessels {
     /// became different in the entity's [`SegmentChanges`]. Nodes beyond the end of `birth_steps` count as born in
     /// step 0.
     pub fn from_tree(kind: VesselKind, tree: &VesselTree, birth_steps: &[u32]) -> Self {
-        let mut vessels = Self { lineage: Lineage::new_one(), ..Self::new(kind) };
+        let mut vessels = Self { lineage: Lineage::new_one(), is_grown: false, ..Self::new(kind) };
         for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
             vessels.push(position, tree.parents()[node], radius, birth_steps.get(node).copied().unwrap_or(0));
         }
@@ -90,6 +101,26 @@ impl Vessels {
     /// Which tree it is.
     pub(crate) fn lineage(&self) -> Lineage {
         self.lineage
+    }
+
+    /// Whether the tree is that of a growth, and not a given one.
+    pub(crate) fn is_grown(&self) -> bool {
+        self.is_grown
+    }
+
+    /// Hash of the tree at rest, or of the one that was saved, until it has grown again.
+    pub(crate) fn hash(&self) -> Option<u64> {
+        if self.tree.is_empty() { self.saved_hash } else { Some(self.tree_at_rest().hash64()) }
+    }
+
+    /// Takes note of the tree that they were saved with.
+    pub(crate) fn awaiting(self, saved_hash: Option<u64>) -> Self {
+        Self { saved_hash, ..self }
+    }
+
+    /// Whether the tree is the one that they were saved with.
+    pub(crate) fn is_as_saved(&self) -> bool {
+        !self.tree.is_empty() && self.saved_hash == self.hash()
     }
 
     /// The step in which each node was born, 0 for roots.
@@ -115,6 +146,7 @@ impl Vessels {
         changes: &mut SegmentChanges,
     ) {
         self.lineage = lineage;
+        self.is_grown = true;
         if changed.is_none() {
             self.clear();
             changes.mark_all();
