@@ -61,6 +61,7 @@ impl Plugin for VesselsPlugin {
         app.add_systems(
             self.schedule,
             (
+                relations::mend_relations.before(VesselSystems::Source),
                 appearance::show_kinds.in_set(VesselSystems::Publish),
                 index::index_vessels.after(VesselSystems::Follow).before(VesselSystems::Cut),
             ),
