@@ -81,16 +81,23 @@ pub struct StepCount {
 pub struct GrownTree<'a> {
     /// Centre lines, on the tissue.
     pub tree: &'a VesselTree,
-    /// The step in which each node was born, 0 for those that growth began with.
+    /// The step in which each node was born, 0 for those that growth began with, and for those beyond its end.
     pub birth_steps: &'a [u32],
     /// How far each node is to be lifted off the tissue before it is drawn or written, in its own radii: the normals of a
     /// surface. Empty where vessels lie on the tissue.
     pub lift: &'a [Vec3],
     /// Attraction points, terminals or whatever else still waits for a vessel of this kind.
     pub waiting: usize,
+    /// Distance from a node within which tissue counts as supplied at present, in tissue lengths.
+    pub reach: f32,
 }
 
-impl GrownTree<'_> {
+impl<'a> GrownTree<'a> {
+    /// A tree that lies on the tissue, all of it there from the beginning, with nothing left to wait for.
+    pub fn of(tree: &'a VesselTree) -> Self {
+        Self { tree, birth_steps: &[], lift: &[], waiting: 0, reach: 0.0 }
+    }
+
     /// Where a node is drawn: lifted off the surface by its radius where the settings say so.
     ///
     /// # Panics

@@ -10,6 +10,7 @@ mod entities;
 mod errors;
 mod growth;
 mod operating_field;
+mod picking;
 mod units;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};
@@ -126,6 +127,14 @@ fn published(world: &World, organ: Entity, kind: VesselKind) -> Vessels {
 
 fn trees(world: &World, organ: Entity) -> [VesselTree; 2] {
     KINDS.map(|kind| published(world, organ, kind).tree().clone())
+}
+
+/// A tree with other positions and radii, and more nodes.
+fn edited(tree: &VesselTree, edit: impl FnOnce(&mut Vec<Vec3>, &mut Vec<u32>, &mut Vec<f32>)) -> VesselTree {
+    let (mut positions, mut parents, mut radii) =
+        (tree.positions().to_vec(), tree.parents().to_vec(), tree.radii().to_vec());
+    edit(&mut positions, &mut parents, &mut radii);
+    VesselTree::from_arrays(positions, parents, radii).expect("parents come first")
 }
 
 /// Asserts that what is published is what the growth has, node by node.

@@ -4,6 +4,7 @@
 //! [`OpenEnd`] entities, [`BloodLoss`](crate::plugin::BloodLoss) and messages.
 
 use crate::plugin::{
+    announcer::Announcer,
     circulation::{
         flow::{CirculationState, Perfused, PerfusedItem, PerfusedOrgan, PerfusedOrganItem, each_kind},
         messages::{BleedingStarted, BleedingStopped, CirculationFailed},
@@ -24,7 +25,6 @@ use bevy::{
         change_detection::{DetectChanges, DetectChangesMut, Res},
         entity::Entity,
         hierarchy::ChildOf,
-        message::MessageWriter,
         system::{Query, SystemParam},
     },
     time::Time,
@@ -32,10 +32,10 @@ use bevy::{
 
 /// Who is told of bleeding.
 #[derive(SystemParam)]
-pub(crate) struct BleedingMessages<'w> {
-    pub(crate) started: MessageWriter<'w, BleedingStarted>,
-    pub(crate) stopped: MessageWriter<'w, BleedingStopped>,
-    pub(crate) failed: MessageWriter<'w, CirculationFailed>,
+pub(crate) struct BleedingMessages<'w, 's> {
+    pub(crate) started: Announcer<'w, 's, BleedingStarted>,
+    pub(crate) stopped: Announcer<'w, 's, BleedingStopped>,
+    pub(crate) failed: Announcer<'w, 's, CirculationFailed>,
 }
 
 /// Lets open ends bleed for as long as the frame lasts.
@@ -149,10 +149,10 @@ fn tell(
         if !change.bleeds {
             if let Some(end) = find(before) {
                 let entity = entity(&end);
-                messages.stopped.write(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity });
+                messages.stopped.announce(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity });
             }
         } else if let Some((end, entity)) = find(now).and_then(|end| Some((end, entity(&end)?))) {
-            messages.started.write(BleedingStarted { organ, vessels, end: end.id, side: end.side, entity });
+            messages.started.announce(BleedingStarted { organ, vessels, end: end.id, side: end.side, entity });
         }
     }
 }

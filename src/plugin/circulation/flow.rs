@@ -4,8 +4,8 @@
 //! made within a frame, those of large ones in the task pool. Given the same vessels, actions and time steps, the same is
 //! lost to the last bit, as long as no network is on its way.
 
-use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::plugin::{
+    announcer::Announcer,
     circulation::{
         bleeding::BleedingMessages,
         messages::{BleedingStopped, CirculationFailed},
@@ -16,12 +16,9 @@ use crate::plugin::{
     },
     growth::{progress::GrowthProgress, state::GrowthState},
     surgery::open_ends::{OpenEnd, OpenEndEntities},
-    vessels::{
-        relations::OrganVessels,
-        tree::{Lineage, Vessels},
-        wounds::VesselWounds,
-    },
+    vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
 };
+use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::synthesis::{
     haemodynamics::{Bleeding, EndState, FlowError},
     tree::{BedLink, ByKind, VesselKind},
@@ -33,7 +30,6 @@ use bevy::{
         entity::Entity,
         hierarchy::ChildOf,
         lifecycle::Remove,
-        message::MessageWriter,
         observer::On,
         query::{QueryData, With},
         system::{Commands, Query},
@@ -234,7 +230,13 @@ impl PerfusedOrganItem<'_, '_> {
             let ends = self.state.bleeding[kind].ends().iter().zip(&self.state.ends[kind]);
             for (_, end) in ends.filter(|(flowing, _)| flowing.state == EndState::Bleeding) {
                 let (organ, vessels) = (self.entity, found.entity);
-                messages.stopped.write(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity: None });
+                messages.stopped.announce(BleedingStopped {
+                    organ,
+                    vessels,
+                    end: end.id,
+                    side: end.side,
+                    entity: None,
+                });
             }
         }
         let settings = *self.state.bleeding.artery.settings();
@@ -256,7 +258,7 @@ impl PerfusedOrganItem<'_, '_> {
         Ok(())
     }
 
-    fn accept(&mut self, made: Result<OrganFlow, FlowError>, failed: &mut MessageWriter<CirculationFailed>) {
+    fn accept(&mut self, made: Result<OrganFlow, FlowError>, failed: &mut Announcer<CirculationFailed>) {
         let is_grown = self.state.made_for.is_some_and(|made_for| made_for.is_grown);
         if let Err(error) = made.and_then(|flow| self.state.take(flow, is_grown)) {
             self.fail(error, failed);
@@ -264,7 +266,7 @@ impl PerfusedOrganItem<'_, '_> {
     }
 
     /// The blood stands still until something changes.
-    pub(crate) fn fail(&mut self, error: FlowError, failed: &mut MessageWriter<CirculationFailed>) {
+    pub(crate) fn fail(&mut self, error: FlowError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
         warn!("{organ}: its blood stands still: {error}");
         self.state.task = None;
@@ -272,7 +274,7 @@ impl PerfusedOrganItem<'_, '_> {
         self.state.ends.values_mut().for_each(Vec::clear);
         self.state.error = Some(error.clone());
         *self.loss = BloodLoss { total: self.loss.total, ..BloodLoss::default() };
-        failed.write(CirculationFailed { organ, error });
+        failed.announce(CirculationFailed { organ, error });
     }
 }
 

@@ -1,13 +1,26 @@
 //! What the circulation tells: which ends bleed, and what keeps blood from flowing.
+//!
+//! Each is a message, and an event on the organ, for observers. An open end is named by the fields: the organ is there to
+//! observe before it is cut, and after the end is closed.
 
 use crate::synthesis::haemodynamics::{EndSide, FlowError};
 use crate::synthesis::wound::EndId;
-use bevy::ecs::{entity::Entity, message::Message};
+use bevy::{
+    ecs::{
+        entity::Entity,
+        event::EntityEvent,
+        message::Message,
+        reflect::{ReflectEvent, ReflectMessage},
+    },
+    reflect::Reflect,
+};
 
-/// An open end begins to bleed.
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+/// An open end begins to bleed. Also an event on the organ, for observers.
+#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct BleedingStarted {
     /// The organ.
+    #[event_target]
     pub organ: Entity,
     /// The vessel entity.
     pub vessels: Entity,
@@ -19,10 +32,13 @@ pub struct BleedingStarted {
     pub entity: Entity,
 }
 
-/// An open end bleeds no more: it has clotted, has no pressure left, or was closed.
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+/// An open end bleeds no more: it has clotted, has no pressure left, or was closed. Also an event on the
+/// organ, for observers.
+#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct BleedingStopped {
     /// The organ.
+    #[event_target]
     pub organ: Entity,
     /// The vessel entity.
     pub vessels: Entity,
@@ -35,9 +51,12 @@ pub struct BleedingStopped {
 }
 
 /// The blood of an organ can't flow. Other organs are not affected; a change of its [`Perfusion`] makes it try again.
-#[derive(Message, Clone, Debug, PartialEq)]
+/// Also an event on the organ, for observers.
+#[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct CirculationFailed {
     /// The organ.
+    #[event_target]
     pub organ: Entity,
     /// What was wrong, with the value and the remedy.
     pub error: FlowError,

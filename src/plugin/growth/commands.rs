@@ -1,9 +1,7 @@
 //! Growing an organ in one call, without waiting for frames.
 
 use crate::plugin::growth::{
-    grow::{is_done, run_to_end},
-    messages::GrowthFinished,
-    progress::GrowthPhase,
+    grow::{end_growths, run_to_end},
     publish::publish_vessels,
     source::{Organ, OrganMeshes, StartMessages},
     state::Need,
@@ -11,7 +9,6 @@ use crate::plugin::growth::{
 use bevy::{
     ecs::{
         entity::Entity,
-        message::MessageWriter,
         system::{EntityCommands, In, Query, RegisteredSystemError},
         world::{EntityWorldMut, World},
     },
@@ -50,20 +47,15 @@ impl EntityCommandsExt for EntityCommands<'_> {
 
 fn grow_organ_now(world: &mut World, organ: Entity) -> Result<(), RegisteredSystemError<In<Entity>>> {
     world.run_system_cached_with(finish_organ, organ)?;
-    if let Err(error) = world.run_system_cached(publish_vessels) {
+    let published = world.run_system_cached(publish_vessels).and_then(|()| world.run_system_cached(end_growths));
+    if let Err(error) = published {
         warn!("{organ}: the vessels are published at the next frame: {error}");
     }
     Ok(())
 }
 
 /// Prepares an organ here and now, and does all its steps.
-fn finish_organ(
-    In(entity): In<Entity>,
-    meshes: OrganMeshes,
-    mut organs: Query<Organ>,
-    mut messages: StartMessages,
-    mut finished: MessageWriter<GrowthFinished>,
-) {
+fn finish_organ(In(entity): In<Entity>, meshes: OrganMeshes, mut organs: Query<Organ>, mut messages: StartMessages) {
     let Ok(mut organ) = organs.get_mut(entity) else {
         warn!("{entity}: grow_now is for entities with a Vasculature");
         return;
@@ -71,12 +63,8 @@ fn finish_organ(
     organ.follow();
     organ.state.hasten();
     if organ.state.need != Need::Nothing {
-        let outcome = organ.begin(&meshes, |_, prepare| Some(prepare()));
+        let outcome = organ.begin(&meshes, None);
         organ.report(outcome, &mut messages);
     }
     run_to_end(&mut organ.state, &mut organ.progress);
-    if organ.progress.phase == GrowthPhase::Growing && is_done(&organ.state) {
-        organ.progress.phase = GrowthPhase::Finished;
-        finished.write(GrowthFinished { organ: entity });
-    }
 }

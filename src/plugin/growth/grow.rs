@@ -5,6 +5,7 @@
 //! included, and it is left to the next frame where it would overrun. The organ whose step was left is the first to have
 //! its turn then: whoever takes part does as many steps as the others, give or take one.
 
+use crate::plugin::announcer::Announcer;
 use crate::plugin::growth::budget::{GrowthBudget, GrowthFrame, begin_after, share_out};
 use crate::plugin::growth::{
     messages::GrowthFinished,
@@ -15,7 +16,6 @@ use bevy::{
     ecs::{
         change_detection::{Res, ResMut},
         entity::Entity,
-        message::MessageWriter,
         system::{Local, Query},
     },
     platform::time::Instant,
@@ -56,15 +56,15 @@ pub(crate) fn grow(
     frame.step_time += start.elapsed();
 }
 
-/// Says which growths have done all their steps.
+/// Publish: says which growths have done all their steps, once their vessels are published.
 pub(crate) fn end_growths(
     mut organs: Query<(Entity, &GrowthState, &mut GrowthProgress)>,
-    mut finished: MessageWriter<GrowthFinished>,
+    mut finished: Announcer<GrowthFinished>,
 ) {
     for (organ, state, mut progress) in &mut organs {
         if progress.phase == GrowthPhase::Growing && is_done(state) {
             progress.phase = GrowthPhase::Finished;
-            finished.write(GrowthFinished { organ });
+            finished.announce(GrowthFinished { organ });
         }
     }
 }

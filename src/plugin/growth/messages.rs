@@ -2,7 +2,15 @@
 
 use crate::plugin::organ::mesh::OrganMeshError;
 use crate::synthesis::{generator::GeneratorError, tissue::TissueError};
-use bevy::ecs::{entity::Entity, message::Message};
+use bevy::{
+    ecs::{
+        entity::Entity,
+        event::EntityEvent,
+        message::Message,
+        reflect::{ReflectEvent, ReflectMessage},
+    },
+    reflect::Reflect,
+};
 
 /// Tells an organ's growth what to do. Obeyed in the same frame or the next; unknown organs are passed over.
 ///
@@ -14,7 +22,8 @@ use bevy::ecs::{entity::Entity, message::Message};
 /// }
 /// # bevy::ecs::system::assert_is_system(step_once);
 /// ```
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Clone, PartialEq)]
 pub struct GrowthCommand {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
     pub organ: Entity,
@@ -30,7 +39,8 @@ impl GrowthCommand {
 }
 
 /// What a growth can be told to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Clone, PartialEq)]
 pub enum GrowthAction {
     /// Do no more steps by itself.
     Pause,
@@ -45,31 +55,52 @@ pub enum GrowthAction {
     Finish,
 }
 
-/// An organ's growth starts from its roots, for the first time or again.
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+/// An organ's growth starts from its roots, for the first time or again. Also an event on the organ, for observers.
+#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct GrowthStarted {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
+    #[event_target]
     pub organ: Entity,
 }
 
-/// An organ's vessels have done all their steps.
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+/// An organ's vessels have done all their steps, and its vessel entities are up to date.
+///
+/// It is a message, and an event on the organ, for observers of it or of all organs:
+///
+/// ```
+/// # use bevy_vessels::{plugin::{GrowthFinished, Vasculature}, synthesis::preset::PresetName};
+/// # use bevy::prelude::{Commands, On};
+/// fn spawn_organ(mut commands: Commands) {
+///     commands.spawn(Vasculature::new(PresetName::Liver)).observe(|finished: On<GrowthFinished>| {
+///         println!("{} has its vessels", finished.organ);
+///     });
+/// }
+/// # bevy::ecs::system::assert_is_system(spawn_organ);
+/// ```
+#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct GrowthFinished {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
+    #[event_target]
     pub organ: Entity,
 }
 
-/// An organ's growth could not start. Other organs are not affected; a change of what was wrong starts it.
-#[derive(Message, Clone, Debug, PartialEq)]
+/// An organ's growth could not start. Other organs are not affected; a change of what was wrong starts it. Also an event
+/// on the organ, for observers.
+#[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct GrowthFailed {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
+    #[event_target]
     pub organ: Entity,
     /// What was wrong, with the value and the remedy.
     pub error: OrganGrowthError,
 }
 
 /// Why an organ's vessels do not grow.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error, Reflect)]
+#[reflect(opaque, Clone, Debug, PartialEq)]
 pub enum OrganGrowthError {
     /// Its mesh is not one that vessels can grow on.
     #[error(transparent)]

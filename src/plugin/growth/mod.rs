@@ -77,15 +77,20 @@ impl Plugin for GrowthPlugin {
             .add_message::<GrowthFailed>()
             .add_observer(publish::remove_vessels);
         diagnostics::register(app);
-        let source = (source::obey_commands, source::notice_changes, source::begin, source::receive_tissues);
-        let grow = (grow::grow, grow::end_growths);
-        let publish = (publish::publish_vessels, diagnostics::measure);
+        let source = (
+            source::obey_commands,
+            source::notice_changes,
+            source::begin,
+            source::receive_tissues,
+            source::show_preparations,
+        );
+        let publish = (publish::publish_vessels, grow::end_growths, diagnostics::measure);
         app.add_systems(
             self.schedule,
             (
                 budget::begin_frame.before(VesselSystems::Source),
                 source.chain().in_set(VesselSystems::Source),
-                grow.chain().in_set(VesselSystems::Grow),
+                grow::grow.in_set(VesselSystems::Grow),
                 publish.chain().in_set(VesselSystems::Publish),
             ),
         );

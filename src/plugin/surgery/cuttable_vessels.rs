@@ -2,9 +2,10 @@
 //!
 //! In: actions in world space, from [`CuttableVessels`] or as [`VesselCommand`] messages. Out: the ledgers in
 //! [`VesselWounds`](crate::plugin::VesselWounds), changed segments marked in
-//! [`SegmentChanges`](crate::plugin::SegmentChanges), and a [`VesselOperation`] for each vessel entity that an action
+//! [`ChangeLog`](crate::plugin::ChangeLog), and a [`VesselOperation`] for each vessel entity that an action
 //! changed.
 
+use crate::plugin::announcer::Announcer;
 use crate::plugin::surgery::{
     messages::{
         OperationError, StrokeId, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,
@@ -49,6 +50,8 @@ use bevy::{
 #[derive(Resource, Debug, Default)]
 pub struct CuttableVessels {
     queue: Vec<VesselCommand>,
+    /// What was done in this frame, and is to be told.
+    done: Vec<VesselOperation>,
     history: UndoHistory,
     /// Organs whose transform has been complained of.
     warned: Vec<Entity>,
@@ -201,7 +204,6 @@ pub(crate) fn carry_out(
     mut door: ResMut<CuttableVessels>,
     mut commands: MessageReader<VesselCommand>,
     mut field: OperatingField,
-    mut done: MessageWriter<VesselOperation>,
     mut failed: MessageWriter<VesselOperationFailed>,
 ) {
     if door.queue.is_empty() && commands.is_empty() {
@@ -210,7 +212,7 @@ pub(crate) fn carry_out(
     let mut queue = std::mem::take(&mut door.queue);
     for command in queue.drain(..).chain(commands.read().cloned()) {
         let outcome = field.carry_out(&command, &mut door.history);
-        done.write_batch(outcome.done);
+        door.done.extend(outcome.done);
         for error in outcome.errors {
             door.complain(&error);
             failed.write(VesselOperationFailed { command: command.clone(), error });
@@ -218,4 +220,11 @@ pub(crate) fn carry_out(
     }
     // The queue keeps its memory.
     door.queue = queue;
+}
+
+/// Cut: tells what was done, once the entities of open ends are there.
+pub(crate) fn tell_operations(mut door: ResMut<CuttableVessels>, mut operations: Announcer<VesselOperation>) {
+    if !door.done.is_empty() {
+        door.done.drain(..).for_each(|operation| operations.announce(operation));
+    }
 }

@@ -8,7 +8,7 @@ use crate::plugin::{
         cuttable_vessels::CuttableVessels,
         open_ends::{OpenEndEntities, despawn_children},
     },
-    vessels::{change_log::SegmentChanges, index::VesselIndex, relations::OrganVessels, tree::Vessels},
+    vessels::{change_log::ChangeLog, index::VesselIndex, relations::OrganVessels, tree::Vessels},
 };
 use crate::synthesis::wound::Retraction;
 use bevy::{
@@ -37,7 +37,8 @@ use bevy::{
 /// # use bevy_vessels::{plugin::{Cuttable, Vasculature}, synthesis::preset::PresetName};
 /// let organ = (Vasculature::new(PresetName::Colon), Cuttable::default());
 /// ```
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Cuttable {
     /// How far the ends of later cuts draw back, so that a gap is seen.
@@ -48,10 +49,12 @@ pub struct Cuttable {
 pub(crate) fn attach_wounds(
     mut commands: Commands,
     organs: Query<&OrganVessels, With<Cuttable>>,
-    bare: Query<(), (With<Vessels>, Without<VesselWounds>)>,
+    bare: Query<&VesselIndex, (With<Vessels>, Without<VesselWounds>)>,
 ) {
-    for entity in organs.iter().flat_map(|vessels| vessels.entities()).filter(|&&entity| bare.contains(entity)) {
-        commands.entity(*entity).insert((VesselWounds::default(), VesselIndex::default(), OpenEndEntities::default()));
+    for &entity in organs.iter().flat_map(|vessels| vessels.entities()) {
+        let Ok(index) = bare.get(entity) else { continue };
+        index.prepare();
+        commands.entity(entity).insert((VesselWounds::default(), OpenEndEntities::default()));
     }
 }
 
@@ -93,7 +96,7 @@ pub(crate) fn follow_settings(
 pub(crate) fn remove_wounds(
     removed: On<Remove, Cuttable>,
     organs: Query<&OrganVessels>,
-    mut vessels: Query<(&OpenEndEntities, &mut SegmentChanges)>,
+    mut vessels: Query<(&OpenEndEntities, &mut ChangeLog)>,
     mut commands: Commands,
 ) {
     let Ok(entities) = organs.get(removed.entity) else { return };
@@ -102,7 +105,7 @@ pub(crate) fn remove_wounds(
         let closed = ends.iter().map(|(_, end)| end).collect();
         commands.entity(entity).queue_silenced(|vessels: EntityWorldMut| despawn_children(vessels, closed));
         changes.mark_all();
-        commands.entity(entity).try_remove::<(VesselWounds, VesselIndex, OpenEndEntities)>();
+        commands.entity(entity).try_remove::<(VesselWounds, OpenEndEntities)>();
     }
 }
 

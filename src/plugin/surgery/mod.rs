@@ -64,6 +64,7 @@ impl Plugin for SurgeryPlugin {
             cuttable_vessels::carry_out,
             open_ends::spawn_open_ends,
             open_ends::move_open_ends,
+            cuttable_vessels::tell_operations,
         );
         app.add_systems(self.schedule, cut.chain().in_set(VesselSystems::Cut));
     }

@@ -23,7 +23,7 @@ use bevy::{
         world::EntityWorldMut,
     },
     math::Vec3,
-    reflect::Reflect,
+    reflect::{Reflect, std_traits::ReflectDefault},
     transform::components::Transform,
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -120,7 +120,9 @@ impl OpenEnd {
 }
 
 /// The entities of the open ends of a vessel entity.
-#[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
+#[component(clone_behavior = Ignore)]
+#[reflect(Component, Default, Clone, PartialEq)]
 pub struct OpenEndEntities(BTreeMap<EndId, Entity>);
 
 impl OpenEndEntities {

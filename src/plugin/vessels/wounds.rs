@@ -2,8 +2,9 @@
 
 use crate::{
     plugin::vessels::{
-        change_log::SegmentChanges,
-        tree::{Lineage, Vessels},
+        change_log::ChangeLog,
+        lineage::Lineage,
+        tree::Vessels,
     },
     synthesis::{
         tree::Place,
@@ -17,7 +18,7 @@ use std::{collections::BTreeSet, ops::Deref};
 /// [`CuttableVessels`](crate::plugin::CuttableVessels).
 ///
 /// Changed only in frames in which something was done. The segments that an action changed are marked in the entity's
-/// [`SegmentChanges`].
+/// [`ChangeLog`].
 #[derive(Component, Debug, Default)]
 pub struct VesselWounds {
     wounds: Wounds,
@@ -41,12 +42,12 @@ impl VesselWounds {
     }
 
     /// Takes note of what an action changed.
-    pub(crate) fn note(&mut self, report: &WoundReport, changes: &mut SegmentChanges) {
+    pub(crate) fn note(&mut self, report: &WoundReport, changes: &mut ChangeLog) {
         self.clamps.extend(&report.clamped);
         for clamp in &report.unclamped {
             self.clamps.remove(clamp);
         }
-        report.changed.iter().for_each(|node| changes.mark_node(node.index()));
+        changes.mark(report.changed.iter().map(|node| node.index()));
     }
 
     /// Whether the ledger is that of these vessels.

@@ -53,6 +53,7 @@ impl Colonization {
             birth_steps: self.birth_steps(kind),
             lift: if self.settings().stand_off { self.normals(kind) } else { &[] },
             waiting: self.drains_left(kind),
+            reach: self.settings().system(kind).map_or(0.0, |own| own.node_birth_distance) * self.length_scale(kind),
         }
     }
 }

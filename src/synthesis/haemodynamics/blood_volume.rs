@@ -77,6 +77,7 @@ impl Default for BloodVolumeSettings {
 
 /// The blood of one patient, which all bleeding organs share.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct BloodVolume {
     settings: BloodVolumeSettings,
     /// In m³.

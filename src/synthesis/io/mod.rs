@@ -32,4 +32,7 @@ pub use atomic::{WriteError, write_atomically};
 #[cfg(feature = "mesh_files")]
 pub use mesh::{MeshReadError, load_mesh, read_glb, read_obj_mesh};
 pub use mesh::{ObjOptions, save_obj, write_obj};
-pub use tree::{ReadError, SwcOptions, SwcReadOptions, load_swc, read_swc, save_csv, save_swc, write_csv, write_swc};
+pub use tree::{
+    ReadError, SwcOptions, SwcReadOptions, kind_of_swc_structure, load_swc, read_swc, save_csv, save_swc,
+    swc_structure, write_csv, write_swc,
+};

@@ -52,6 +52,7 @@ pub enum TetMeshError {
 
 /// Tetrahedra that fill an organ, as a soft body has them, checked by [`new`](Self::new).
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct TetMesh {
     positions: Vec<Vec3>,
     tetrahedra: Vec<[u32; 4]>,

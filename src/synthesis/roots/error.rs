@@ -9,24 +9,24 @@ pub enum RootError {
     /// A coordinate that is NaN, infinite or beyond [`MAX_COORDINATE`].
     #[error("the {} root at {position} has a coordinate that is not finite and within ±{MAX_COORDINATE}", kind.name())]
     NotFinite {
-        /// The system whose root it is.
+        /// The kind whose root it is.
         kind: VesselKind,
         /// The position asked for.
         position: Vec3,
     },
     /// A root out of reach of the tissue.
     #[error(
-        "the {} root at {position} is {distance} from the tissue, further than its influence distance {reach}; move it closer or ask for the tissue's nearest point",
+        "the {} root at {position} is {distance} from the tissue, further than the {reach} that it may be; move it closer or ask for the tissue's nearest point",
         kind.name()
     )]
     TooFar {
-        /// The system whose root it is.
+        /// The kind whose root it is.
         kind: VesselKind,
         /// The position asked for.
         position: Vec3,
         /// Its distance from the tissue.
         distance: f32,
-        /// The system's influence distance.
+        /// The largest distance allowed.
         reach: f32,
     },
     /// Roots or a given tree of a kind that the generator doesn't grow.
@@ -38,7 +38,7 @@ pub enum RootError {
     /// Two roots at the same place.
     #[error("two roots, {} and {}, coincide at {position}; move one of them", kinds[0].name(), kinds[1].name())]
     Coincide {
-        /// The systems of the two roots.
+        /// The kinds of the two roots.
         kinds: [VesselKind; 2],
         /// Where they are.
         position: Vec3,
@@ -46,7 +46,7 @@ pub enum RootError {
     /// More roots to be spread than [`Roots::MAX_SPREAD`](super::Roots::MAX_SPREAD).
     #[error("{count} {} roots are more than {limit}", kind.name())]
     TooMany {
-        /// The system in question.
+        /// The kind in question.
         kind: VesselKind,
         /// The number asked for.
         count: u32,
@@ -56,30 +56,30 @@ pub enum RootError {
     /// A tissue that gave fewer places than roots are to be spread.
     #[error("the tissue has room for {found} of {wanted} {} roots; ask for fewer", kind.name())]
     NoRoom {
-        /// The system in question.
+        /// The kind in question.
         kind: VesselKind,
         /// The number asked for.
         wanted: u32,
         /// The number of places found.
         found: u32,
     },
-    /// A way that roots are to reach below [`Roots::LEAST_REACH`](super::Roots::LEAST_REACH), or not a number.
+    /// A distance for roots to reach that is below [`Roots::LEAST_REACH`](super::Roots::LEAST_REACH), or not a number.
     #[error("{} roots are to reach {reach} equivalent diameters; it must be finite and at least {least}", kind.name())]
     Reach {
-        /// The system in question.
+        /// The kind in question.
         kind: VesselKind,
         /// The value found.
         reach: f32,
         /// The least value.
         least: f32,
     },
-    /// Both systems put their roots beside those of the other.
+    /// Arteries and veins each put their roots beside the other.
     #[error("arterial and venous roots are both to be put beside the other's; place one of them otherwise")]
     BesideEachOther,
     /// A given tree with such a coordinate.
     #[error("node {node} of the given {} tree is at {position}, which is not finite and within ±{MAX_COORDINATE}", kind.name())]
     GivenNotFinite {
-        /// The system whose tree it is.
+        /// The kind whose tree it is.
         kind: VesselKind,
         /// The node.
         node: usize,
@@ -88,15 +88,15 @@ pub enum RootError {
     },
     /// A given tree out of reach of the tissue.
     #[error(
-        "the given {} tree comes no closer to the tissue than {distance}, further than its influence distance {reach}; is it in the organ's local space?",
+        "the given {} tree comes no closer to the tissue than {distance}, further than the {reach} that it may be; is it in the organ's local space?",
         kind.name()
     )]
     GivenTooFar {
-        /// The system whose tree it is.
+        /// The kind whose tree it is.
         kind: VesselKind,
         /// The smallest distance of a node from the tissue.
         distance: f32,
-        /// The system's influence distance.
+        /// The largest distance allowed.
         reach: f32,
     },
 }

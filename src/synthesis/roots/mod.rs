@@ -1,7 +1,7 @@
 //! Where vessels enter the tissue.
 //!
-//! In come a [`Roots`] description, the tissue and the growth's settings; out come the points at which the arteries and
-//! the veins begin. Whatever is chosen automatically follows from the seed ([`Stream::Roots`]).
+//! In: a [`Roots`] description, the tissue and the generator's [`RootSpacing`]. Out: the points at which each kind of
+//! vessels begins. The seed decides everything that is chosen automatically ([`Stream::Roots`]).
 
 mod error;
 mod spread;
@@ -20,7 +20,7 @@ use crate::synthesis::{
 use bevy_math::Vec3;
 use std::ops::Index;
 
-/// Where the roots of one system are put.
+/// Where the roots of one kind of vessels are put.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
@@ -37,19 +37,18 @@ pub enum RootPlacement {
     /// of one, measured along the tissue, chosen by the seed. A tissue with an [entrance](Tissue::entrance) has its only
     /// root there.
     ///
-    /// Higher values give fewer roots, whose vessels have further to go; how far they come in the steps they have is up to
-    /// step length, steps and growth of the tissue: some 0.7 times the way of a straight vessel on a surface, 0.55 in a
-    /// volume. A tissue of stages is measured by the one in force first, in diameters of the last, by which lengths are
-    /// fitted.
+    /// Higher values give fewer roots, whose vessels have further to go. Step length, number of steps and growth of the
+    /// tissue decide how far a vessel comes: about 0.7 times as far as a straight one on a surface, 0.55 times in a volume.
+    /// A tissue of stages is measured in its first stage, in diameters of its last, to which lengths are fitted.
     ///
     /// Limits: at least [`Roots::LEAST_REACH`]. Usual: [`Roots::DEFAULT_REACH`].
     Within(f32),
-    /// One root beside each root of the other system, a step length away, in a direction chosen by the seed. Roots of the
-    /// other system's given tree count too.
+    /// One root beside each root of the [companion](VesselKind::companion), a step length away, in a direction chosen by the
+    /// seed. Roots of the companion's given tree count too.
     Beside,
     /// The tissue's nearest point to each of these.
     Nearest(Vec<Vec3>),
-    /// Exactly these points. Each must be within the system's influence distance of the tissue.
+    /// Exactly these points. Each must be within [`RootSpacing::reach`] of the tissue.
     Exact(Vec<Vec3>),
 }
 
@@ -118,12 +117,13 @@ impl From<RootPlacements> for Roots {
     }
 }
 
-/// The two lengths of a generator that its roots go by, in tissue lengths.
+/// The two lengths of a generator that the placement of its roots needs, in tissue lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RootSpacing {
-    /// How far from a root another one beside it is put, and what tells two roots apart: the length of a segment.
+    /// Distance of a root from the root that it is put beside: the length of a segment. Two roots much nearer than this
+    /// coincide.
     pub step: f32,
-    /// How far from the tissue a root may lie that is given as it is.
+    /// Largest distance from the tissue of a root whose place is given exactly.
     pub reach: f32,
 }
 
@@ -131,16 +131,16 @@ impl Roots {
     /// Most roots that are spread automatically.
     pub const MAX_SPREAD: u32 = 4096;
 
-    /// How far from a root, along the tissue, there may be tissue, in equivalent diameters. The furthest points of a disc,
-    /// a ball and the surface of a ball are nearer than that, so they have one root.
+    /// Largest distance of tissue from a root, measured along the tissue, in equivalent diameters. Discs, balls and surfaces
+    /// of balls have no point further from any other, so that one root is enough.
     pub const DEFAULT_REACH: f32 = 1.15;
-    /// The least such way: below it, samples are too few to measure by.
+    /// Least value of that distance. Below it there are too few samples to measure by.
     pub const LEAST_REACH: f32 = 0.1;
 
     /// Distance, in step lengths, below which two roots coincide.
     const COINCIDENCE: f32 = 1.0e-4;
 
-    /// The points at which arteries and veins begin, given trees aside, on the tissue in force at step 1.
+    /// The points at which each kind of vessels begins, without its given tree, on the tissue in force at step 1.
     ///
     /// # Errors
     /// The first root that cannot be put where it was asked for, or given tree that is out of reach.
@@ -183,7 +183,7 @@ impl Roots {
         Ok(roots)
     }
 
-    /// The kinds in an order in which those whose roots others go by come first.
+    /// The kinds in an order in which a kind comes before those that are put beside it.
     fn order(&self) -> Result<impl Iterator<Item = VesselKind>, RootError> {
         let is_beside = |kind: VesselKind| self.placed[kind] == RootPlacement::Beside;
         if is_beside(VesselKind::Artery) && is_beside(VesselKind::Artery.companion()) {

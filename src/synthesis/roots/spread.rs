@@ -1,4 +1,4 @@
-//! Roots that the seed chooses: far from each other, or beside those of the other system.
+//! Roots that the seed chooses: far from each other, or beside those of another kind.
 
 use super::{RootError, Roots};
 use crate::synthesis::{

@@ -1,7 +1,7 @@
 //! Roots as many as a tissue needs: one in a compact organ, several in a long one.
 //!
-//! In come a tissue and the way, along the tissue, that the vessels of a root reach; out come roots that together reach all of
-//! it. Ways are measured over samples that are joined to their nearest ones, as by Tenenbaum, de Silva and Langford, "A
+//! In: a tissue and the distance along it that the vessels of one root reach. Out: roots that together reach all of it.
+//! Distances are measured over samples that are joined to their nearest ones, as by Tenenbaum, de Silva and Langford, "A
 //! Global Geometric Framework for Nonlinear Dimensionality Reduction" (2000), so that the two ends of a bent organ
 //! are far apart, and parts that nothing joins have roots of their own.
 
@@ -49,7 +49,7 @@ pub(super) fn within(
     if samples.is_empty() {
         return Err(RootError::NoRoom { kind, wanted: 1, found: 0 });
     }
-    // Whoever says where vessels enter has said all.
+    // A tissue that names its entrance has one root, there.
     let place = |&position: &Vec3| TissuePoint { position, ..tissue.closest_point(position) };
     if tissue.entrance().is_some() {
         return Ok(vec![place(&samples[0])]);

@@ -41,6 +41,7 @@ pub const NO_PARENT: u32 = u32::MAX;
 /// Positions and radii are in tissue lengths. A parent always stands before its children: `parents[i] < i`, so a
 /// reverse loop runs from the tips to the roots and a forward loop from the roots to the tips.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct VesselTree {
     positions: Vec<Vec3>,
     parents: Vec<u32>,

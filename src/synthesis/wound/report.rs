@@ -27,6 +27,7 @@ pub struct ClampId {
 
 /// One end of a severed vessel, where it is now.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct SeveredEnd {
     /// What it is known by.
     pub id: EndId,
@@ -52,6 +53,7 @@ pub struct SeveredEnd {
 /// Ends that were open before and after are in neither list, nor are those that were closed both times, such as the ends
 /// of a cut through a sealed vessel.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct WoundReport {
     /// Number of places at which a vessel was severed. 0 for all but cuts.
     pub severed: usize,

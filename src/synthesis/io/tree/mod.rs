@@ -5,5 +5,5 @@ mod swc;
 mod swc_read;
 
 pub use csv::{save_csv, write_csv};
-pub use swc::{SwcOptions, save_swc, write_swc};
+pub use swc::{SwcOptions, kind_of_swc_structure, save_swc, swc_structure, write_swc};
 pub use swc_read::{ReadError, SwcReadOptions, load_swc, read_swc};

@@ -5,7 +5,7 @@
 //! `SWCplus` specification (neuroinformatics.nl/swcPlus). A file may have several roots.
 
 use crate::synthesis::io::{WriteError, write_atomically};
-use crate::synthesis::tree::{NO_PARENT, VesselTree};
+use crate::synthesis::tree::{NO_PARENT, VesselKind, VesselTree};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -16,11 +16,26 @@ pub struct SwcOptions {
     ///
     /// Default: none. The name and version of this crate and the names of the columns are always there.
     pub comments: Vec<String>,
-    /// The type column of every node: 0 is undefined, 1 to 4 are parts of a neuron, from 5 on the meaning is the user's.
+    /// The type column of every node: 0 is undefined, 1 to 7 are parts of neurons and glia, beyond them the meaning is the
+    /// user's. [`swc_structure`] gives that of a kind of vessels.
     ///
     /// Default: 0.
     pub structure: u32,
 }
+
+/// The type column that this crate gives to vessels of a kind: 10 for arteries, 11 for veins, 12 for portal veins, 13 for
+/// ducts. The format has no types of its own for vessels.
+pub fn swc_structure(kind: VesselKind) -> u32 {
+    FIRST_STRUCTURE + kind.index() as u32
+}
+
+/// The kind of vessels that a type column stands for; `None` for types that are not of [`swc_structure`].
+pub fn kind_of_swc_structure(structure: u32) -> Option<VesselKind> {
+    VesselKind::ALL.get(structure.checked_sub(FIRST_STRUCTURE)? as usize).copied()
+}
+
+/// The type of arteries.
+const FIRST_STRUCTURE: u32 = 10;
 
 /// Writes a tree to an SWC file, whole or not at all. See [`write_swc`].
 ///
@@ -53,4 +68,17 @@ pub fn write_swc(mut out: impl Write, tree: &VesselTree, options: &SwcOptions) -
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_kind_has_a_type_that_leads_back() {
+        for kind in VesselKind::ALL {
+            assert_eq!(kind_of_swc_structure(swc_structure(kind)), Some(kind));
+        }
+        assert!([0, 4, 7, 9, 14, u32::MAX].into_iter().all(|other| kind_of_swc_structure(other).is_none()));
+    }
 }
