@@ -19,6 +19,7 @@ pub(crate) mod index;
 pub(crate) mod lineage;
 pub(crate) mod pick;
 pub(crate) mod relations;
+mod saved;
 pub(crate) mod tree;
 pub(crate) mod wounds;
 
