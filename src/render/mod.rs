@@ -1,6 +1,6 @@
 //! Drawing: vessels as instanced segments, lit by Bevy's own materials.
 //!
-//! In: [`Vessels`](crate::plugin::Vessels) and the chunks of them that [`SegmentChanges`](crate::plugin::SegmentChanges)
+//! In: [`Vessels`](crate::plugin::Vessels) and the chunks of them that [`ChangeLog`](crate::plugin::ChangeLog)
 //! marks. Out: a picture, with shadows, prepasses and multisampling.
 //!
 //! A vessel entity, however large, is a handful of chunk entities that share a few meshes: many copies of a template cone

@@ -5,7 +5,7 @@ use bevy::{
     ecs::reflect::{ReflectComponent, ReflectEvent, ReflectMessage, ReflectResource},
     reflect::{TypeRegistration, TypeRegistry},
 };
-use bevy_vessels::plugin::{Cuttable, Perfusion, VesselAppearance};
+use bevy_vessels::plugin::{Cuttable, JobSettings, Perfusion, VesselAppearance};
 use std::{fs, path::Path};
 
 /// What reflection does not know, and why.
@@ -14,7 +14,7 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("GrowthState", "a growth under way, with its tissue: regrown from the Vasculature"),
     ("RestMesh", "a copy of the organ's mesh"),
     ("SegmentBuffer", "buffers on the graphics card"),
-    ("SegmentChanges", "what changed in the last frames"),
+    ("ChangeLog", "what changed in which frame"),
     ("VesselIndex", "made anew from the Vessels"),
 ];
 
@@ -107,6 +107,7 @@ fn settings_survive_a_file() {
     assert_round_trip(&VesselAppearance { shown: Default::default(), ..default() });
     assert_round_trip(&Cuttable::default());
     assert_round_trip(&quick());
+    assert_round_trip(&JobSettings { at_once: 3, ..default() });
     let budget = GrowthBudget::Steps(3);
     assert_eq!(ron::from_str(&ron::to_string(&budget).expect("a budget")), Ok(budget));
 }

@@ -4,7 +4,6 @@
 //! made within a frame, those of large ones in the task pool. Given the same vessels, actions and time steps, the same is
 //! lost to the last bit, as long as no network is on its way.
 
-use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::plugin::{
     announcer::Announcer,
     circulation::{
@@ -17,12 +16,9 @@ use crate::plugin::{
     },
     growth::{progress::GrowthProgress, state::GrowthState},
     surgery::open_ends::{OpenEnd, OpenEndEntities},
-    vessels::{
-        relations::OrganVessels,
-        tree::{Lineage, Vessels},
-        wounds::VesselWounds,
-    },
+    vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
 };
+use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::synthesis::{
     haemodynamics::{Bleeding, EndState, FlowError},
     tree::{BedLink, ByKind, VesselKind},
@@ -263,7 +259,13 @@ impl PerfusedOrganItem<'_, '_> {
             let ends = self.state.bleeding[kind].ends().iter().zip(&self.state.ends[kind]);
             for (_, end) in ends.filter(|(flowing, _)| flowing.state == EndState::Bleeding) {
                 let (organ, vessels) = (self.entity, found.entity);
-                messages.stopped.announce(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity: None });
+                messages.stopped.announce(BleedingStopped {
+                    organ,
+                    vessels,
+                    end: end.id,
+                    side: end.side,
+                    entity: None,
+                });
             }
         }
         let settings = *self.state.bleeding.artery.settings();

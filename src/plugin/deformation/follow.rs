@@ -8,10 +8,7 @@ use crate::plugin::{
     deformation::bound::{Bound, Motion, RestOrgan, VesselBinding},
     growth::{progress::GrowthProgress, state::GrowthState},
     organ::mesh::{copy_mesh, vertex_positions},
-    vessels::{
-        relations::OrganVessels,
-        tree::{Lineage, Vessels},
-    },
+    vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels},
 };
 use crate::synthesis::mesh::TetMesh;
 use bevy::{

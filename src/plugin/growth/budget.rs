@@ -143,7 +143,7 @@ pub(crate) fn begin_frame(mut frame: ResMut<GrowthFrame>) {
 
 #[cfg(test)]
 mod tests {
-    use crate::plugin::growth::grow::*;
+    use super::*;
     use std::cell::Cell;
 
     const MS: Duration = Duration::from_millis(1);

@@ -7,20 +7,16 @@ use crate::plugin::{
         progress::GrowthControl,
         vasculature::Vasculature,
     },
+    job::Job,
     organ::mesh::OrganMeshError,
-    vessels::tree::Lineage,
+    vessels::lineage::Lineage,
 };
 use crate::synthesis::{
     growth::{GrownTree, Growth, GrowthWarning, TreeUpdate},
     tissue::Tissue,
     tree::{ByKind, VesselKind},
 };
-use bevy::{
-    asset::AssetId,
-    ecs::component::Component,
-    mesh::Mesh,
-    tasks::{Task, futures::check_ready},
-};
+use bevy::{asset::AssetId, ecs::component::Component, mesh::Mesh};
 use std::{sync::Arc, time::Duration};
 
 /// A tissue, or why there is none.
@@ -45,8 +41,8 @@ pub struct GrowthState {
     pub(crate) need: Need,
     /// The wishes and the mesh that the growth follows, or is about to.
     followed: Option<(Vasculature, Option<AssetId<Mesh>>)>,
-    /// A tissue being prepared. Letting go of the task cancels it, so that no outdated tissue ever arrives.
-    preparation: Option<Task<Prepared>>,
+    /// A tissue being prepared. To let go of the job stops it, so that no outdated tissue ever arrives.
+    preparation: Option<Job<Prepared>>,
     tissue: Option<Arc<dyn Tissue>>,
     /// Which tissue it is, or will be when it is ready.
     tissue_lineage: Lineage,
@@ -192,21 +188,24 @@ impl GrowthState {
     }
 
     /// Waits for a tissue from now on.
-    pub(crate) fn await_tissue(&mut self, preparation: Task<Prepared>) {
+    pub(crate) fn await_tissue(&mut self, preparation: Job<Prepared>) {
         self.preparation = Some(preparation);
         self.need = Need::Nothing;
     }
 
     /// Whether a tissue has been prepared and waits to be grown on.
     pub(crate) fn is_tissue_ready(&self) -> bool {
-        self.preparation.as_ref().is_some_and(Task::is_finished)
+        self.preparation.as_ref().is_some_and(Job::is_done)
+    }
+
+    /// Share of the preparation under way that is done, if there is one.
+    pub(crate) fn preparation_progress(&self) -> Option<f32> {
+        self.preparation.as_ref().map(Job::progress)
     }
 
     /// The result of the preparation, once it is there.
     pub(crate) fn poll_preparation(&mut self) -> Option<Prepared> {
-        let result = check_ready(self.preparation.as_mut()?)?;
-        self.preparation = None;
-        Some(result)
+        Job::poll(&mut self.preparation)
     }
 
     /// Starts the growth on a new tissue, or on the one at hand, where its buffers are used again.

@@ -8,7 +8,7 @@ use crate::plugin::{
         cuttable_vessels::CuttableVessels,
         open_ends::{OpenEndEntities, despawn_children},
     },
-    vessels::{change_log::SegmentChanges, index::VesselIndex, relations::OrganVessels, tree::Vessels},
+    vessels::{change_log::ChangeLog, index::VesselIndex, relations::OrganVessels, tree::Vessels},
 };
 use crate::synthesis::wound::Retraction;
 use bevy::{
@@ -49,11 +49,13 @@ pub struct Cuttable {
 pub(crate) fn attach_wounds(
     mut commands: Commands,
     organs: Query<&OrganVessels, With<Cuttable>>,
-    bare: Query<(), (With<Vessels>, Or<(Without<VesselWounds>, Without<VesselIndex>, Without<OpenEndEntities>)>)>,
+    bare: Query<&VesselIndex, (With<Vessels>, Or<(Without<VesselWounds>, Without<OpenEndEntities>)>)>,
 ) {
-    for entity in organs.iter().flat_map(|vessels| vessels.entities()).filter(|&&entity| bare.contains(entity)) {
+    for &entity in organs.iter().flat_map(|vessels| vessels.entities()) {
+        let Ok(index) = bare.get(entity) else { continue };
+        index.prepare();
         // Vessels from a scene have a ledger already.
-        commands.entity(*entity).insert_if_new((VesselWounds::default(), VesselIndex::default(), OpenEndEntities::default()));
+        commands.entity(entity).insert_if_new((VesselWounds::default(), OpenEndEntities::default()));
     }
 }
 
@@ -105,7 +107,7 @@ pub(crate) fn follow_settings(
 pub(crate) fn remove_wounds(
     removed: On<Remove, Cuttable>,
     organs: Query<&OrganVessels>,
-    mut vessels: Query<(&OpenEndEntities, &mut SegmentChanges)>,
+    mut vessels: Query<(&OpenEndEntities, &mut ChangeLog)>,
     mut commands: Commands,
 ) {
     let Ok(entities) = organs.get(removed.entity) else { return };
@@ -114,7 +116,7 @@ pub(crate) fn remove_wounds(
         let closed = ends.iter().map(|(_, end)| end).collect();
         commands.entity(entity).queue_silenced(|vessels: EntityWorldMut| despawn_children(vessels, closed));
         changes.mark_all();
-        commands.entity(entity).try_remove::<(VesselWounds, VesselIndex, OpenEndEntities)>();
+        commands.entity(entity).try_remove::<(VesselWounds, OpenEndEntities)>();
     }
 }
 

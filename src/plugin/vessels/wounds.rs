@@ -2,8 +2,9 @@
 
 use crate::{
     plugin::vessels::{
-        change_log::SegmentChanges,
-        tree::{Lineage, Vessels},
+        change_log::ChangeLog,
+        lineage::Lineage,
+        tree::Vessels,
     },
     synthesis::{
         tree::Place,
@@ -21,7 +22,7 @@ use std::{collections::BTreeSet, ops::Deref};
 /// [`CuttableVessels`](crate::plugin::CuttableVessels).
 ///
 /// Changed only in frames in which something was done. The segments that an action changed are marked in the entity's
-/// [`SegmentChanges`].
+/// [`ChangeLog`].
 ///
 /// Scenes and clones of the entity keep it, but for the history of undo. There it is empty until the vessels are there, too;
 /// and it stays empty, with a warning, where these are others than those that it was saved with.
@@ -51,12 +52,12 @@ impl VesselWounds {
     }
 
     /// Takes note of what an action changed.
-    pub(crate) fn note(&mut self, report: &WoundReport, changes: &mut SegmentChanges) {
+    pub(crate) fn note(&mut self, report: &WoundReport, changes: &mut ChangeLog) {
         self.clamps.extend(&report.clamped);
         for clamp in &report.unclamped {
             self.clamps.remove(clamp);
         }
-        report.changed.iter().for_each(|node| changes.mark_node(node.index()));
+        changes.mark(report.changed.iter().map(|node| node.index()));
     }
 
     /// Whether the ledger is that of these vessels.
