@@ -1,6 +1,9 @@
 //! Vessel entities: the tree of one kind of vessels, what changed in it, what was done to it, and how it looks.
 
-use crate::plugin::order::{self, VesselSystems};
+use crate::plugin::{
+    job,
+    order::{self, VesselSystems},
+};
 use bevy::{
     app::{App, Plugin, Update},
     ecs::{
@@ -16,6 +19,7 @@ pub(crate) mod index;
 pub(crate) mod lineage;
 pub(crate) mod pick;
 pub(crate) mod relations;
+mod saved;
 pub(crate) mod tree;
 pub(crate) mod wounds;
 
@@ -28,7 +32,8 @@ pub use relations::{OrganVessels, VesselsOf};
 pub use tree::Vessels;
 pub use wounds::VesselWounds;
 
-/// What every room needs of vessel entities: that they are shown or hidden, and indexed.
+/// What every room needs of vessel entities: that they are shown or hidden, and indexed. And what takes longer than a
+/// frame is done as [`JobSettings`](crate::plugin::JobSettings) say.
 ///
 /// The other plugins of vessels add it themselves.
 #[derive(Clone, Debug)]
@@ -60,6 +65,7 @@ impl Default for VesselsPlugin {
 impl Plugin for VesselsPlugin {
     fn build(&self, app: &mut App) {
         order::configure(app, self.schedule);
+        job::register(app, self.schedule);
         app.register_required_components::<Vessels, VesselIndex>();
         app.add_systems(
             self.schedule,

@@ -1,8 +1,11 @@
 //! What to make of an organ's mesh, as data: what the plugin and the command line pass on.
 
-use crate::synthesis::mesh::TriangleMesh;
 use crate::synthesis::tissue::{
     DensityField, DensityTissue, GuidePath, MeshSurface, MeshVolume, Staged, Tissue, TissueError,
+};
+use crate::synthesis::{
+    mesh::TriangleMesh,
+    pace::{Pace, at_once},
 };
 use bevy_math::Vec3;
 use std::sync::Arc;
@@ -91,11 +94,29 @@ impl TissueSettings {
     /// Voxels along the longest side of the organ.
     pub const DEFAULT_RESOLUTION: u32 = MeshVolume::DEFAULT_RESOLUTION;
 
+    /// How much work it is to [build](Self::build) the tissue of so many triangles, in items: the triangles, and the voxels
+    /// where the inside is needed.
+    pub fn work(&self, triangles: usize) -> usize {
+        let voxels = || (self.resolution as usize).saturating_pow(3);
+        match self.mode {
+            TissueMode::Surface => triangles,
+            TissueMode::Volume | TissueMode::Staged { .. } => triangles.saturating_add(voxels()),
+        }
+    }
+
     /// Makes the tissue of an organ's mesh.
     ///
     /// # Errors
     /// What is wrong with the settings, or with the mesh for this purpose: see [`TissueError`].
     pub fn build(&self, mesh: &TriangleMesh) -> Result<Arc<dyn Tissue>, TissueError> {
+        at_once(self.build_paced(mesh, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`build`](Self::build).
+    pub async fn build_paced(&self, mesh: &TriangleMesh, _pace: &Pace) -> Result<Arc<dyn Tissue>, TissueError> {
         let field = self.density.as_ref().map(|values| DensityField::on_vertices(mesh, values)).transpose()?;
         let thinned = |tissue: Arc<dyn Tissue>| -> Result<Arc<dyn Tissue>, TissueError> {
             Ok(match &field {
