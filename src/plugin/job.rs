@@ -102,9 +102,14 @@ pub(crate) struct Jobs<'w> {
 }
 
 impl Jobs<'_> {
+    /// Items up to which work is done at once.
+    pub(crate) fn at_once(&self) -> usize {
+        self.settings.at_once
+    }
+
     /// Whether work on so many items is done at once.
     pub(crate) fn is_small(&self, items: usize) -> bool {
-        items <= self.settings.at_once
+        items <= self.at_once()
     }
 
     /// Begins work on about so many items. If they are few, it is done when this returns.

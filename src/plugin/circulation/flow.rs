@@ -1,7 +1,7 @@
 //! Circulate: the blood of organs with a [`Perfusion`], made to flow.
 //!
-//! In: [`Vessels`] at rest and the organ's settings. Out: the flow in [`CirculationState`]. Networks of small trees are
-//! made within a frame, those of large ones in the task pool. Given the same vessels, actions and time steps, the same is
+//! In: [`Vessels`] at rest and the organ's settings. Out: the flow in [`CirculationState`]. Networks are made in
+//! jobs. Given the same vessels, actions and time steps, the same is
 //! lost to the last bit, as long as no network is on its way.
 
 use crate::plugin::{
@@ -15,12 +15,14 @@ use crate::plugin::{
         supply::Gauge,
     },
     growth::{progress::GrowthProgress, state::GrowthState},
+    job::{Job, Jobs},
     surgery::open_ends::{OpenEnd, OpenEndEntities},
     vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
 };
 use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::synthesis::{
     haemodynamics::{Bleeding, EndState, FlowError},
+    pace::Pace,
     tree::{BedLink, ByKind, VesselKind},
 };
 use bevy::{
@@ -38,12 +40,8 @@ use bevy::{
     },
     log::warn,
     reflect::{Reflect, ReflectDeserialize, ReflectSerialize, std_traits::ReflectDefault},
-    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
 };
 use serde::{Deserialize, Serialize};
-
-/// Nodes whose networks are made within a frame; those of more are made beside the frames.
-pub(crate) const AT_ONCE: usize = 8192;
 
 /// The flow in an organ's vessels. The plugin drives it.
 ///
@@ -59,7 +57,7 @@ pub struct CirculationState {
     #[serde(skip)]
     made_with: Option<Perfusion>,
     #[serde(skip)]
-    task: Option<Task<Result<OrganFlow, FlowError>>>,
+    job: Option<Job<Result<OrganFlow, FlowError>>>,
     #[serde(skip)]
     pub(crate) flow: Option<OrganFlow>,
     pub(crate) bleeding: ByKind<Bleeding>,
@@ -172,15 +170,20 @@ pub(crate) fn prepare_organs(
 }
 
 /// Makes the flow of vessels that are new, have grown, or are to be perfused otherwise.
-pub(crate) fn make_flow(mut organs: Query<PerfusedOrgan>, vessels: Query<Perfused>, mut messages: BleedingMessages) {
+pub(crate) fn make_flow(
+    mut organs: Query<PerfusedOrgan>,
+    vessels: Query<Perfused>,
+    mut messages: BleedingMessages,
+    jobs: Jobs,
+) {
     for mut organ in &mut organs {
         let made_for = organ.vessels_now(&vessels);
         if organ.takes_note_of(made_for) {
-            organ.begin(made_for, &vessels, &mut messages);
+            organ.begin(made_for, &vessels, &mut messages, &jobs);
         }
-        let Some(made) = organ.state.task.as_mut().and_then(check_ready) else { continue };
-        organ.state.task = None;
-        organ.accept(made, &mut messages.failed);
+        if let Some(made) = Job::poll(&mut organ.state.job) {
+            organ.accept(made, &mut messages.failed);
+        }
     }
 }
 
@@ -211,11 +214,11 @@ impl PerfusedOrganItem<'_, '_> {
         is_new
     }
 
-    /// Begins to make a flow: at once where that is quick. Large trees wait until they have grown.
-    fn begin(&mut self, made_for: MadeFor, vessels: &Query<Perfused>, messages: &mut BleedingMessages) {
+    /// Begins to make a flow. Large trees wait until they have grown.
+    fn begin(&mut self, made_for: MadeFor, vessels: &Query<Perfused>, messages: &mut BleedingMessages, jobs: &Jobs) {
         let is_other = self.state.made_for.is_some_and(|before| before.is_replaced_by(&made_for));
         self.state.made_for = Some(made_for);
-        self.state.task = None;
+        self.state.job = None;
         self.state.error = None;
         if is_other {
             self.forget(vessels, messages);
@@ -225,7 +228,7 @@ impl PerfusedOrganItem<'_, '_> {
             return;
         }
         let nodes: usize = made_for.nodes.values().sum();
-        if nodes > AT_ONCE && !made_for.is_grown {
+        if !(made_for.is_grown || jobs.is_small(nodes)) {
             return;
         }
         let (trees, perfusion) = (self.trees(vessels), Perfusion::clone(&self.perfusion));
@@ -233,13 +236,8 @@ impl PerfusedOrganItem<'_, '_> {
             Some(growth) if perfusion.bed.resistance.is_some() => growth.bed_links().to_vec(),
             _ => Vec::new(),
         };
-        let make = move || OrganFlow::new(trees, &perfusion, &links);
-        if nodes > AT_ONCE {
-            let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
-            self.state.task = Some(pool.spawn(async move { make() }));
-        } else {
-            self.accept(make(), &mut messages.failed);
-        }
+        let make = async move |pace: Pace| OrganFlow::new(trees, &perfusion, &links, &pace).await;
+        self.state.job = Some(jobs.start(nodes, make));
     }
 
     /// Copies of the trees at rest.
@@ -298,7 +296,7 @@ impl PerfusedOrganItem<'_, '_> {
     pub(crate) fn fail(&mut self, error: FlowError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
         warn!("{organ}: its blood stands still: {error}");
-        self.state.task = None;
+        self.state.job = None;
         self.state.flow = None;
         self.state.ends.values_mut().for_each(Vec::clear);
         self.state.error = Some(error.clone());

@@ -4,12 +4,12 @@
 //! and the supply of segments and vertices.
 
 use crate::plugin::circulation::perfusion::Perfusion;
-use crate::synthesis::tree::ByKind;
 use crate::synthesis::{
     haemodynamics::{
         Bleeding, BloodVolume, Circulation, FlowError, Interruption, Network, Outlet, Supply, TissueSupply,
     },
-    tree::{BedLink, NodeId, VesselKind, VesselTree},
+    pace::Pace,
+    tree::{BedLink, ByKind, NodeId, VesselKind, VesselTree},
     units::Pressure,
     wound::{Blockage, EndId, EndSide, Wounds},
 };
@@ -37,21 +37,21 @@ struct Networks {
 }
 
 impl Networks {
-    fn new(trees: &Trees, perfusion: &Perfusion, links: &[BedLink]) -> Result<Self, FlowError> {
+    async fn new(trees: &Trees, perfusion: &Perfusion, links: &[BedLink], pace: &Pace) -> Result<Self, FlowError> {
         let mut networks = Self::default();
-        for (kind, tree) in trees.iter() {
-            if let Some((tree, settings)) = tree.as_ref().zip(perfusion.flow_settings(kind)) {
-                networks.apart[kind] = Some(Network::new(tree, settings)?);
+        for (kind, pace) in each_kind(&pace.part(0.0..0.8)) {
+            if let Some((tree, settings)) = trees[kind].as_ref().zip(perfusion.flow_settings(kind)) {
+                networks.apart[kind] = Some(Network::new_paced(tree, settings, &pace).await?);
             }
         }
         if perfusion.bed.resistance.is_some() && !links.is_empty() {
-            networks.join(links)?;
+            networks.join(links, &pace.part(0.8..1.0)).await?;
         }
         Ok(networks)
     }
 
     /// Joins arteries and veins through the bed, where there are both.
-    fn join(&mut self, links: &[BedLink]) -> Result<(), FlowError> {
+    async fn join(&mut self, links: &[BedLink], pace: &Pace) -> Result<(), FlowError> {
         let Self { joined, apart } = self;
         match (apart.artery.take(), apart.vein.take()) {
             (Some(arteries), Some(veins)) => {
@@ -59,7 +59,7 @@ impl Networks {
                 let is_there =
                     |link: &&BedLink| link.arterial.index() < arteries.len() && link.venous.index() < veins.len();
                 let links: Vec<BedLink> = links.iter().filter(is_there).copied().collect();
-                *joined = Some(Box::new(Circulation::new(arteries, veins, &links)?));
+                *joined = Some(Box::new(Circulation::new_paced(arteries, veins, &links, pace).await?));
             }
             (arteries, veins) => (apart.artery, apart.vein) = (arteries, veins),
         }
@@ -94,11 +94,16 @@ impl Networks {
         Ok(())
     }
 
-    fn solve(&mut self) -> Result<(), FlowError> {
+    async fn solve(&mut self, pace: &Pace) -> Result<(), FlowError> {
         if let Some(joined) = &mut self.joined {
-            joined.solve()?;
+            joined.solve_paced(&pace.part(0.0..0.5)).await?;
         }
-        self.apart.values_mut().flatten().try_for_each(Network::solve)
+        for (kind, pace) in each_kind(&pace.part(0.5..1.0)) {
+            if let Some(network) = &mut self.apart[kind] {
+                network.solve_paced(&pace).await?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -111,8 +116,13 @@ pub(crate) struct OrganFlow {
 
 impl OrganFlow {
     /// The flow in the intact vessels.
-    pub(crate) fn new(trees: Trees, perfusion: &Perfusion, links: &[BedLink]) -> Result<Self, FlowError> {
-        Ok(Self { networks: Networks::new(&trees, perfusion, links)?, trees: Arc::new(trees) })
+    pub(crate) async fn new(
+        trees: Trees,
+        perfusion: &Perfusion,
+        links: &[BedLink],
+        pace: &Pace,
+    ) -> Result<Self, FlowError> {
+        Ok(Self { networks: Networks::new(&trees, perfusion, links, pace).await?, trees: Arc::new(trees) })
     }
 
     /// Lays the gaps of an earlier flow of the same vessels over this one, so that its holes stay as they are.
@@ -188,14 +198,14 @@ impl OrganFlow {
     }
 
     /// Makes this copy equal to the flow that a condition is of, at the mean of the pulse, and solves it altogether.
-    fn solve_in(&mut self, condition: &Condition) -> Result<(), FlowError> {
+    async fn solve_in(&mut self, condition: &Condition, pace: &Pace) -> Result<(), FlowError> {
         for (kind, (gaps, openings)) in condition.of_kinds.iter() {
             let Some(network) = self.networks.get_mut(kind) else { continue };
             network.set_interruptions(gaps)?;
             openings.iter().enumerate().try_for_each(|(end, &share)| network.set_opening(end, share))?;
         }
         self.networks.hold_at(condition.pressure_share)?;
-        self.networks.solve()
+        self.networks.solve(pace).await
     }
 }
 
@@ -230,25 +240,38 @@ pub(crate) struct Measured {
 impl SupplyGauge {
     /// Measures from now on against what flows in the intact vessels of `flow`, whose gaps don't count. `vertices` are
     /// the organ's, at rest.
-    pub(crate) fn new(mut flow: OrganFlow, vertices: &[Vec3]) -> Result<Self, FlowError> {
-        flow.solve_in(&Condition { of_kinds: ByKind::default(), pressure_share: 1.0 })?;
-        let supply = |kind: VesselKind| {
-            let (tree, network) = (flow.trees[kind].as_ref(), flow.networks.get(kind));
-            tree.zip(network).map_or_else(Supply::default, |(tree, network)| Supply::against(tree, network))
+    pub(crate) async fn new(mut flow: OrganFlow, vertices: &[Vec3], pace: &Pace) -> Result<Self, FlowError> {
+        let intact = Condition { of_kinds: ByKind::default(), pressure_share: 1.0 };
+        flow.solve_in(&intact, &pace.part(0.0..0.3)).await?;
+        let mut of_kinds = ByKind::<Supply>::default();
+        for (kind, pace) in each_kind(&pace.part(0.3..0.4)) {
+            if let Some((tree, network)) = flow.trees[kind].as_ref().zip(flow.networks.get(kind)) {
+                of_kinds[kind] = Supply::against_paced(tree, network, &pace).await;
+            }
+        }
+        let tissue = match &flow.trees.artery {
+            Some(tree) if !vertices.is_empty() => {
+                Some(TissueSupply::new_paced(tree, vertices, &pace.part(0.4..1.0)).await)
+            }
+            _ => None,
         };
-        let arteries = flow.trees.artery.as_ref();
-        let tissue = arteries.filter(|_| !vertices.is_empty()).map(|tree| TissueSupply::new(tree, vertices));
-        Ok(Self { of_kinds: ByKind::from_fn(supply), tissue, flow })
+        Ok(Self { of_kinds, tissue, flow })
     }
 
     /// Measures the vessels in a condition.
-    pub(crate) fn measure(&mut self, condition: &Condition, ischaemic_below: f32) -> Result<Measured, FlowError> {
+    pub(crate) async fn measure(
+        &mut self,
+        condition: &Condition,
+        ischaemic_below: f32,
+        pace: &Pace,
+    ) -> Result<Measured, FlowError> {
         let flow = &mut self.flow;
-        flow.solve_in(condition)?;
+        flow.solve_in(condition, &pace.part(0.0..0.7)).await?;
         let mut share = 0.0;
-        for (kind, supply) in VesselKind::ALL.into_iter().zip(self.of_kinds.values_mut()) {
+        for (kind, pace) in each_kind(&pace.part(0.7..1.0)) {
             let (Some(tree), Some(network)) = (&flow.trees[kind], flow.networks.get(kind)) else { continue };
-            supply.update(tree, network);
+            let supply = &mut self.of_kinds[kind];
+            supply.update_paced(tree, network, &pace).await;
             if kind == VesselKind::Artery {
                 share = supply.ischaemic_share(tree, ischaemic_below);
             }
@@ -262,6 +285,13 @@ impl SupplyGauge {
             ischaemic_share: share,
         })
     }
+}
+
+/// The kinds of vessels, each with its part of the work.
+fn each_kind(pace: &Pace) -> impl Iterator<Item = (VesselKind, Pace)> {
+    let share = 1.0 / VesselKind::ALL.len() as f32;
+    let part = move |index: usize| pace.part(index as f32 * share..(index + 1) as f32 * share);
+    VesselKind::ALL.into_iter().enumerate().map(move |(index, kind)| (kind, part(index)))
 }
 
 /// What a blockage in the ledger is to the flow.

@@ -1,20 +1,21 @@
 //! Circulate: which tissue still gets blood.
 //!
 //! In: the flow of an organ. Out: [`SegmentSupply`] on its vessel entities and [`OrganSupply`] on the organ, after each
-//! action and, while something bleeds, now and then. For large organs it is measured in the task pool.
+//! action and, while something bleeds, now and then. It is measured in jobs.
 
 use crate::plugin::vessels::tree::Vessels;
 use crate::plugin::{
     circulation::{
-        flow::{AT_ONCE, CirculationState},
+        flow::CirculationState,
         organ_flow::{Condition, Measured, OrganFlow, SupplyGauge},
         patient::{Patient, patient_of},
         perfusion::{OrganSupply, Perfusion, SegmentSupply},
     },
+    job::{Job, Jobs},
     organ::{mesh::vertex_positions, rest::RestMesh},
     vessels::relations::OrganVessels,
 };
-use crate::synthesis::haemodynamics::FlowError;
+use crate::synthesis::{haemodynamics::FlowError, pace::Pace};
 use bevy::{
     asset::Assets,
     ecs::{
@@ -27,7 +28,6 @@ use bevy::{
     log::warn,
     math::Vec3,
     mesh::{Mesh, Mesh3d},
-    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
 };
 
 /// A gauge, with what it has measured.
@@ -36,9 +36,9 @@ type Outcome = Result<(Box<SupplyGauge>, Measured), FlowError>;
 /// When the supply of an organ is measured, and with what.
 #[derive(Debug, Default)]
 pub(crate) struct Gauge {
-    /// `None` before the first measurement, and while the task has it.
+    /// `None` before the first measurement, and while the job has it.
     gauge: Option<Box<SupplyGauge>>,
-    task: Option<Task<Outcome>>,
+    job: Option<Job<Outcome>>,
     /// Whether the organ's vessels have grown, so that there is something to measure.
     is_ready: bool,
     /// Whether something was done to the vessels since it was measured.
@@ -68,7 +68,7 @@ impl Gauge {
 
     fn is_to_begin(&self, interval: f32) -> bool {
         let is_old = self.bled && self.age >= f64::from(interval);
-        self.is_ready && self.task.is_none() && (self.is_due || is_old)
+        self.is_ready && self.job.is_none() && (self.is_due || is_old)
     }
 
     /// Hands out what is measured with, and begins to count anew.
@@ -100,12 +100,15 @@ enum Source {
 }
 
 impl Order {
-    fn carry_out(self) -> Outcome {
-        let mut gauge = match self.source {
-            Source::Gauge(gauge) => gauge,
-            Source::New { flow, vertices } => Box::new(SupplyGauge::new(flow, &vertices)?),
+    async fn carry_out(self, pace: Pace) -> Outcome {
+        let (mut gauge, pace) = match self.source {
+            Source::Gauge(gauge) => (gauge, pace),
+            Source::New { flow, vertices } => {
+                let gauge = SupplyGauge::new(flow, &vertices, &pace.part(0.0..0.8)).await?;
+                (Box::new(gauge), pace.part(0.8..1.0))
+            }
         };
-        let measured = gauge.measure(&self.condition, self.ischaemic_below)?;
+        let measured = gauge.measure(&self.condition, self.ischaemic_below, &pace).await?;
         Ok((gauge, measured))
     }
 }
@@ -130,32 +133,31 @@ pub(crate) fn measure_supply(
     patients: Query<&Patient>,
     parents: Query<&ChildOf>,
     meshes: Option<Res<Assets<Mesh>>>,
+    jobs: Jobs,
 ) {
     for mut organ in &mut organs {
         if !organ.state.gauge.is_ready {
             organ.clear(&mut vessels);
             continue;
         }
-        let outcome = if organ.state.gauge.is_to_begin(organ.perfusion.supply_interval) {
+        if organ.state.gauge.is_to_begin(organ.perfusion.supply_interval) {
             let patient = patient_of(organ.entity, &parents, |entity| patients.contains(entity));
             let patient = patient.and_then(|patient| patients.get(patient).ok()).copied().unwrap_or_default();
-            organ.begin(&patient, meshes.as_deref())
-        } else {
-            organ.state.bypass_change_detection().gauge.task.as_mut().and_then(check_ready)
-        };
-        if let Some(outcome) = outcome {
+            organ.begin(&patient, meshes.as_deref(), &jobs);
+        }
+        if let Some(outcome) = Job::poll(&mut organ.state.bypass_change_detection().gauge.job) {
             organ.accept(outcome, &mut vessels);
         }
     }
 }
 
 impl SuppliedItem<'_, '_> {
-    /// Begins a measurement. Gives the outcome of one that was quick.
-    fn begin(&mut self, patient: &Patient, meshes: Option<&Assets<Mesh>>) -> Option<Outcome> {
+    /// Begins a measurement, if blood flows.
+    fn begin(&mut self, patient: &Patient, meshes: Option<&Assets<Mesh>>, jobs: &Jobs) {
         let state = self.state.bypass_change_detection();
-        let condition = state.flow()?.condition(&patient.blood);
         let gauge = state.gauge.begin();
-        let flow = state.flow()?;
+        let Some(flow) = state.flow() else { return };
+        let condition = flow.condition(&patient.blood);
         let mut work = flow.nodes();
         let source = match gauge {
             Some(gauge) => Source::Gauge(gauge),
@@ -166,12 +168,7 @@ impl SuppliedItem<'_, '_> {
             }
         };
         let order = Order { source, condition, ischaemic_below: self.perfusion.ischaemic_below };
-        if work <= AT_ONCE {
-            return Some(order.carry_out());
-        }
-        let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
-        self.state.bypass_change_detection().gauge.task = Some(pool.spawn(async move { order.carry_out() }));
-        None
+        self.state.bypass_change_detection().gauge.job = Some(jobs.start(work, |pace| order.carry_out(pace)));
     }
 
     /// The organ's vertices, at rest where it is known how that is; none without a mesh that can be read.
@@ -195,7 +192,6 @@ impl SuppliedItem<'_, '_> {
 
     fn accept(&mut self, outcome: Outcome, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
         let gauge = &mut self.state.bypass_change_detection().gauge;
-        gauge.task = None;
         let mut measured = match gauge.accept(outcome) {
             Ok(measured) => measured,
             Err(error) => {

@@ -1,16 +1,17 @@
 //! Vessels bound to an organ at rest, and moved with it.
 //!
 //! In: the organ at rest, and where its vertices are. Out: [`Vessels`] with moved nodes, and all that goes by where they
-//! are. Binding is done in the task pool for large organs.
+//! are. Binding is done in jobs.
 
 use crate::plugin::{
-    circulation::flow::AT_ONCE,
+    job::{Job, Jobs},
     organ::mesh::MeshCopy,
     vessels::{change_log::ChangeLog, lineage::Lineage, tree::Vessels},
 };
 use crate::synthesis::{
     binding::{Binding, BindingError},
     mesh::{TetMesh, TriangleMesh},
+    pace::Pace,
     tree::VesselTree,
 };
 use bevy::{
@@ -23,7 +24,6 @@ use bevy::{
         system::Query,
     },
     math::Vec3,
-    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
 };
 use std::sync::Arc;
 
@@ -44,13 +44,13 @@ impl RestOrgan {
     }
 
     /// `None` where it is no organ. The tissue is prepared from the same triangles, and says what is wrong with them.
-    fn bind(&self, tree: &VesselTree) -> Option<Binding> {
+    async fn bind(&self, tree: &VesselTree, pace: &Pace) -> Option<Binding> {
         match self {
             Self::Surface(mesh) => {
                 let mesh = TriangleMesh::new(mesh.positions.clone(), mesh.triangles.clone(), None).ok()?;
-                Some(Binding::to_surface(tree, &mesh))
+                Some(Binding::to_surface_paced(tree, &mesh, pace).await)
             }
-            Self::Solid(mesh) => Some(Binding::to_tetrahedra(tree, mesh)),
+            Self::Solid(mesh) => Some(Binding::to_tetrahedra_paced(tree, mesh, pace).await),
         }
     }
 }
@@ -59,7 +59,7 @@ impl RestOrgan {
 #[derive(Component, Debug, Default)]
 pub(crate) struct VesselBinding {
     binding: Option<Binding>,
-    task: Option<Task<Option<Binding>>>,
+    job: Option<Job<Option<Binding>>>,
     /// What it was made for.
     made_for: Option<MadeFor>,
 }
@@ -97,11 +97,16 @@ pub(crate) struct Motion<'a> {
 
 impl Motion<'_> {
     /// Moves an organ's vessel entities as far as that is due. One that can't be moved doesn't keep the others from it.
-    pub(crate) fn carry_along(&self, vessels: &[Entity], bound: &mut Query<Bound>) -> Result<(), BindingError> {
+    pub(crate) fn carry_along(
+        &self,
+        vessels: &[Entity],
+        bound: &mut Query<Bound>,
+        jobs: &Jobs,
+    ) -> Result<(), BindingError> {
         let mut outcome = Ok(());
         let mut each = bound.iter_many_mut(vessels);
         while let Some(mut vessels) = each.fetch_next() {
-            let is_new = vessels.bind(self);
+            let is_new = vessels.bind(self, jobs);
             if self.has_moved || is_new || vessels.vessels.is_changed() {
                 outcome = outcome.and(vessels.follow(self.vertices));
             }
@@ -111,9 +116,9 @@ impl Motion<'_> {
 }
 
 impl BoundItem<'_, '_> {
-    /// Binds the vessels to the organ at rest where that is due: at once where it is quick. Says whether there is a new
+    /// Binds the vessels to the organ at rest where that is due. Says whether there is a new
     /// binding.
-    fn bind(&mut self, motion: &Motion) -> bool {
+    fn bind(&mut self, motion: &Motion, jobs: &Jobs) -> bool {
         let made_for = MadeFor { vessels: self.vessels.lineage(), organ: motion.lineage, is_grown: motion.is_grown };
         let binding = &mut *self.binding;
         if binding.made_for != Some(made_for) && !self.vessels.tree().is_empty() {
@@ -125,17 +130,10 @@ impl BoundItem<'_, '_> {
             }
             binding.made_for = Some(made_for);
             let (tree, rest) = (self.vessels.tree_at_rest().into_owned(), motion.rest.clone());
-            if tree.len() + rest.elements() > AT_ONCE {
-                let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
-                binding.task = Some(pool.spawn(async move { rest.bind(&tree) }));
-            } else {
-                binding.task = None;
-                binding.binding = rest.bind(&tree);
-                return true;
-            }
+            let work = tree.len() + rest.elements();
+            binding.job = Some(jobs.start(work, async move |pace: Pace| rest.bind(&tree, &pace).await));
         }
-        let Some(bound) = binding.task.as_mut().and_then(check_ready) else { return false };
-        binding.task = None;
+        let Some(bound) = Job::poll(&mut binding.job) else { return false };
         binding.binding = bound;
         true
     }

@@ -7,6 +7,7 @@ use crate::plugin::organ::rest::RestMesh;
 use crate::plugin::{
     deformation::bound::{Bound, Motion, RestOrgan, VesselBinding},
     growth::{progress::GrowthProgress, state::GrowthState},
+    job::Jobs,
     organ::mesh::{copy_mesh, vertex_positions},
     vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels},
 };
@@ -185,6 +186,7 @@ pub(crate) fn follow_meshes(
     meshes: Option<Res<Assets<Mesh>>>,
     mut organs: Query<FollowedMesh, (With<FollowsMesh>, Without<FollowsTetrahedra>)>,
     mut bound: Query<Bound>,
+    jobs: Jobs,
 ) {
     let Some(meshes) = meshes else { return };
     for mut organ in &mut organs {
@@ -209,7 +211,7 @@ pub(crate) fn follow_meshes(
             has_moved,
             vertices: if is_at_rest { None } else { Some(&organ.rest.followed) },
         };
-        if let Err(error) = motion.carry_along(organ.vessels.entities(), &mut bound) {
+        if let Err(error) = motion.carry_along(organ.vessels.entities(), &mut bound, &jobs) {
             organ.rest.bypass_change_detection().warn(organ.entity, &error.to_string());
         }
     }
@@ -227,7 +229,7 @@ pub(crate) struct FollowedTetrahedra {
 }
 
 /// Publish: vessels go where their organ's tetrahedra are.
-pub(crate) fn follow_tetrahedra(mut organs: Query<FollowedTetrahedra>, mut bound: Query<Bound>) {
+pub(crate) fn follow_tetrahedra(mut organs: Query<FollowedTetrahedra>, mut bound: Query<Bound>, jobs: Jobs) {
     for mut organ in &mut organs {
         let tetrahedra = &organ.tetrahedra;
         let is_at_rest = tetrahedra.positions == tetrahedra.rest.positions();
@@ -238,7 +240,7 @@ pub(crate) fn follow_tetrahedra(mut organs: Query<FollowedTetrahedra>, mut bound
             has_moved: tetrahedra.is_changed(),
             vertices: if is_at_rest { None } else { Some(&tetrahedra.positions) },
         };
-        if let Err(error) = motion.carry_along(organ.vessels.entities(), &mut bound) {
+        if let Err(error) = motion.carry_along(organ.vessels.entities(), &mut bound, &jobs) {
             organ.rest.bypass_change_detection().warn(organ.entity, &error.to_string());
         }
     }

@@ -1,22 +1,23 @@
 //! Which segments of a vessel entity an instrument may meet, at any moment of a growth and without holding up a frame.
 //!
 //! In: [`Vessels`] and their [`ChangeLog`]. Out: candidates for a cut or a touch, and what a ray meets first. Small trees
-//! are indexed when they are first asked about. Large ones are indexed in the task pool from then on; what the index
-//! doesn't hold yet is searched one by one, so that an answer is complete at any time, and the same.
+//! are indexed when they are first asked about. Large ones are indexed in jobs from then on; what the index doesn't hold
+//! yet is searched one by one, so that an answer is complete at any time, and the same.
 
-use crate::plugin::vessels::{
-    change_log::{ChangeCursor, ChangeLog},
-    lineage::Lineage,
-    tree::Vessels,
+use crate::plugin::{
+    job::{Job, JobSettings, Jobs},
+    vessels::{
+        change_log::{ChangeCursor, ChangeLog},
+        lineage::Lineage,
+        tree::Vessels,
+    },
 };
 use crate::synthesis::{
+    pace::Pace,
     segment_index::{RayCast, Region, SegmentIndex, SegmentSearch},
     tree::{NO_PARENT, NodeId, VesselTree},
 };
-use bevy::{
-    ecs::{change_detection::DetectChangesMut, component::Component, system::Query},
-    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
-};
+use bevy::ecs::{change_detection::DetectChangesMut, component::Component, system::Query};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 /// An index over the segments of a vessel entity. Every vessel entity has one, which is empty and costs nothing until
@@ -30,7 +31,7 @@ pub struct VesselIndex {
     state: RwLock<IndexState>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct IndexState {
     index: SegmentIndex,
     /// The changes that the index has followed.
@@ -39,23 +40,45 @@ struct IndexState {
     tree: Lineage,
     /// Whether anyone has ever asked.
     is_wanted: bool,
-    coming: Option<ComingIndex>,
+    /// A newer index on its way.
+    coming: Option<Job<ComingIndex>>,
+    /// Nodes up to which a tree is indexed when it is asked about.
+    at_once: usize,
     /// Nodes of the tree in the last frame, and for how many frames there were so many.
     len: usize,
     idle_frames: u32,
 }
 
-/// An index that is made beside the frames.
+/// An index that was made in a job.
 #[derive(Debug)]
 struct ComingIndex {
-    task: Task<SegmentIndex>,
+    index: SegmentIndex,
     /// The changes that it has followed: those until the tree was copied.
     cursor: ChangeCursor,
 }
 
+impl ComingIndex {
+    async fn of(tree: VesselTree, cursor: ChangeCursor, pace: Pace) -> Self {
+        Self { index: SegmentIndex::new_paced(&tree, &pace).await, cursor }
+    }
+}
+
+impl Default for IndexState {
+    fn default() -> Self {
+        Self {
+            index: SegmentIndex::default(),
+            cursor: ChangeCursor::default(),
+            tree: Lineage::default(),
+            is_wanted: false,
+            coming: None,
+            at_once: JobSettings::DEFAULT_AT_ONCE,
+            len: 0,
+            idle_frames: 0,
+        }
+    }
+}
+
 impl VesselIndex {
-    /// Nodes that are indexed within a frame, some 3 ms. Larger trees are indexed beside the frames.
-    const AT_ONCE: usize = 8192;
     /// Frames without growth after which what it left is indexed.
     const IDLE_FRAMES: u32 = 10;
 
@@ -103,7 +126,7 @@ impl IndexState {
     /// Whether the index is that of the vessels as they are, as far as it goes.
     fn follows(&self, vessels: &Vessels, log: &ChangeLog) -> bool {
         let len = vessels.tree().len();
-        let is_long_enough = self.index.len() == len || len > VesselIndex::AT_ONCE;
+        let is_long_enough = self.index.len() == len || len > self.at_once;
         self.tree == vessels.lineage() && self.index.len() <= len && is_long_enough && self.cursor.is_current(log)
     }
 
@@ -111,7 +134,7 @@ impl IndexState {
     fn follow(&mut self, vessels: &Vessels, log: &ChangeLog) {
         self.forget_others(vessels);
         let (tree, known) = (vessels.tree(), self.index.len());
-        if tree.len() <= VesselIndex::AT_ONCE {
+        if tree.len() <= self.at_once {
             self.index.extend(tree);
         }
         let changes = self.cursor.read(log);
@@ -125,32 +148,27 @@ impl IndexState {
     /// Forgets another tree's segments.
     fn forget_others(&mut self, vessels: &Vessels) {
         if self.tree != vessels.lineage() || self.index.len() > vessels.tree().len() {
-            *self = Self { tree: vessels.lineage(), is_wanted: self.is_wanted, ..Self::default() };
+            let (is_wanted, at_once) = (self.is_wanted, self.at_once);
+            *self = Self { tree: vessels.lineage(), is_wanted, at_once, ..Self::default() };
         }
     }
 
     /// Takes over an index that has become ready, and begins to index a large tree anew where that pays.
-    fn advance(&mut self, vessels: &Vessels, log: &ChangeLog) {
-        if let Some(coming) = &mut self.coming
-            && let Some(index) = check_ready(&mut coming.task)
-        {
-            (self.index, self.cursor) = (index, coming.cursor.clone());
-            self.coming = None;
+    fn advance(&mut self, vessels: &Vessels, log: &ChangeLog, jobs: &Jobs) {
+        self.at_once = jobs.at_once();
+        if let Some(come) = Job::poll(&mut self.coming) {
+            (self.index, self.cursor) = (come.index, come.cursor);
         }
         self.forget_others(vessels);
         let (len, indexed) = (vessels.tree().len(), self.index.len());
         self.idle_frames = if len == self.len { self.idle_frames.saturating_add(1) } else { 0 };
         self.len = len;
         let is_due = len - indexed > indexed / 2 || self.idle_frames > VesselIndex::IDLE_FRAMES;
-        if len > VesselIndex::AT_ONCE && len > indexed && is_due && self.coming.is_none() {
-            self.coming = Some(ComingIndex { task: begin(vessels.tree().clone()), cursor: log.now() });
+        if len > self.at_once && len > indexed && is_due && self.coming.is_none() {
+            let (tree, cursor) = (vessels.tree().clone(), log.now());
+            self.coming = Some(jobs.start(len, |pace| ComingIndex::of(tree, cursor, pace)));
         }
     }
-}
-
-/// Begins to index a tree beside the frames.
-fn begin(tree: VesselTree) -> Task<SegmentIndex> {
-    AsyncComputeTaskPool::get_or_init(TaskPool::new).spawn(async move { SegmentIndex::new(&tree) })
 }
 
 /// Vessels with their index, for questions. Both stay as they are while this is held.
@@ -208,11 +226,11 @@ impl SegmentSearch for &IndexedVessels<'_> {
 }
 
 /// Cut: indexes that someone asked go on being made.
-pub(crate) fn index_vessels(mut vessels: Query<(&Vessels, &ChangeLog, &mut VesselIndex)>) {
+pub(crate) fn index_vessels(mut vessels: Query<(&Vessels, &ChangeLog, &mut VesselIndex)>, jobs: Jobs) {
     for (vessels, log, mut index) in &mut vessels {
         let state = index.bypass_change_detection().state.get_mut().unwrap_or_else(PoisonError::into_inner);
         if state.is_wanted {
-            state.advance(vessels, log);
+            state.advance(vessels, log, &jobs);
         }
     }
 }
