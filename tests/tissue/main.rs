@@ -1,6 +1,8 @@
 //! Tissues against their oracles: analytic moments, brute force, and meshes whose volume is known.
 
 mod fields;
+mod no_go;
+mod sources;
 mod volume;
 
 use bevy_math::{
@@ -8,7 +10,7 @@ use bevy_math::{
     bounding::{Aabb3d, BoundingVolume},
 };
 use bevy_vessels::synthesis::{
-    mesh::TriangleMesh,
+    mesh::{TriangleIndex, TriangleMesh},
     random::{Stream, VesselRng},
     tissue::*,
 };

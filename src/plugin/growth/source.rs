@@ -20,7 +20,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     mesh::TriangleMesh,
-    tissue::{Tissue, TissueSettings},
+    tissue::{SourceData, Tissue, TissueSource},
 };
 use bevy::{
     asset::{AssetEvent, AssetId, AssetServer, Assets, LoadState},
@@ -168,9 +168,10 @@ fn mesh_news(event: &AssetEvent<Mesh>) -> Option<(AssetId<Mesh>, bool)> {
 }
 
 /// The slow part of the preparation, as a pure function of what was copied from the mesh.
-fn prepare(copy: MeshCopy, settings: &TissueSettings) -> Prepared {
+fn prepare(copy: MeshCopy, source: &TissueSource) -> Prepared {
     let mesh = TriangleMesh::new(copy.positions, copy.triangles, None).map_err(OrganMeshError::from)?;
-    Ok(settings.build(&mesh)?)
+    let data = SourceData { mesh: Some(Arc::new(mesh)), image: None };
+    Ok(Arc::clone(source.prepare(&data)?.tissue()))
 }
 
 impl OrganMeshes<'_> {

@@ -3,6 +3,7 @@
 //! In: positions and indices as a file or an engine's mesh holds them. Out: a [`TriangleMesh`] that every later stage can
 //! work with, its [`topology`], an index of its triangles ([`TriangleIndex`]) and its voxels.
 
+mod indexed;
 mod shaded;
 pub(crate) mod tet_mesh;
 pub mod topology;
@@ -11,6 +12,7 @@ mod triangle_mesh;
 pub(crate) mod voxels;
 pub(crate) mod winding;
 
+pub use indexed::IndexedMesh;
 pub use shaded::ShadedMesh;
 pub use tet_mesh::{TetMesh, TetMeshError};
 pub use topology::{MeshTopology, Welding};
