@@ -28,7 +28,7 @@ use bevy::{
 };
 use bevy_vessels::{
     VesselPlugin,
-    plugin::{SegmentChanges, VesselAppearance, Vessels, VesselsOf},
+    plugin::{ChangeLog, VesselAppearance, Vessels, VesselsOf},
     render::SegmentChunk,
     synthesis::tree::{NO_PARENT, VesselKind, VesselTree},
 };
@@ -50,8 +50,8 @@ fn main() {
     let idle = measure([&mut empty, &mut full], |_| {});
     // what a step changes in a large tree: a tenth of its segments, scattered
     let growing = measure([&mut empty, &mut full], |world| {
-        let mut changes = world.get_mut::<SegmentChanges>(vessels).expect("required by the system");
-        (0..segments).step_by(10).for_each(|node| changes.mark_node(node));
+        let mut log = world.get_mut::<ChangeLog>(vessels).expect("required by vessels");
+        log.mark((0..segments).step_by(10));
     });
     let world = full.world_mut();
     println!("{segments} segments in {} chunk entities", world.query::<&SegmentChunk>().iter(world).len());
@@ -94,8 +94,8 @@ fn spawn_vessels(app: &mut App, segments: usize) -> Entity {
     let tree = VesselTree::from_arrays(positions.collect(), parents, vec![1e-4; segments + 1]).expect("well-formed");
     let world = app.world_mut();
     let organ = world.spawn((Transform::default(), Visibility::default(), VesselAppearance::default())).id();
-    let vessels = Vessels::from_tree(&tree, &[]);
-    world.spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(VesselKind::Artery), vessels)).id()
+    let vessels = Vessels::from_tree(VesselKind::Artery, &tree, &[]);
+    world.spawn((ChildOf(organ), VesselsOf(organ), vessels)).id()
 }
 
 /// Times of a frame in milliseconds, in the order of the columns.

@@ -10,9 +10,10 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use bevy_vessels::{
+    VesselPlugin,
     plugin::{
-        BloodLoss, CirculationState, CuttableVessels, FollowsMesh, GrowthPlugin, OpenEnd, OrganSupply, Perfusion,
-        StrokeId, VesselIndex, Vessels, VesselsOf,
+        BloodLoss, CirculationState, CuttableVessels, FollowsMesh, OpenEnd, OrganSupply, Perfusion, StrokeId,
+        VesselIndex, Vessels, VesselsOf,
     },
     synthesis::{
         haemodynamics::{Pulse, RootPressure},
@@ -76,7 +77,7 @@ fn operate(segments: usize) {
 /// An app without a window, and a ball of 0.2 m with vessels on it, with all that takes time made.
 fn organ(segments: usize) -> (App, Entity) {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, GrowthPlugin::default()));
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, VesselPlugin::default()));
     app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
     app.finish();
     app.cleanup();
@@ -85,9 +86,8 @@ fn organ(segments: usize) -> (App, Entity) {
     let blood = Perfusion { scale: Scale::METRES, arterial_pressure, ..default() };
     let organ = (Mesh3d(mesh), Transform::default(), Visibility::default(), blood, FollowsMesh);
     let organ = app.world_mut().spawn(organ).id();
-    let vessels = Vessels::from_tree(&tree(segments), &[]);
-    let vessels =
-        app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(VesselKind::Artery), vessels)).id();
+    let vessels = Vessels::from_tree(VesselKind::Artery, &tree(segments), &[]);
+    let vessels = app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), vessels)).id();
     let is_ready = |world: &World| {
         let (index, tree) = (world.get::<VesselIndex>(vessels), world.get::<Vessels>(vessels));
         let is_indexed = index.zip(tree).is_some_and(|(index, tree)| index.is_complete(tree));

@@ -8,9 +8,9 @@ use bevy_vessels::synthesis::{
     mesh::TriangleMesh,
     organ::ColonSettings,
     preset::PresetName,
-    roots::{RootPlacement, Roots},
+    roots::{RootPlacement, RootPlacements, Roots},
     tissue::{Ball, Disc, MeshSurface, Tissue},
-    tree::{VesselKind, hash_trees},
+    tree::hash_trees,
 };
 use common::{Case, tissues};
 use std::{collections::BTreeMap, sync::Arc};
@@ -26,21 +26,21 @@ fn start(case: &Case, seed: u64) -> Colonization {
 
 /// Everything that a growth gives, as one number and the normals' bits.
 fn outcome(growth: &Colonization) -> (u64, Vec<u32>) {
-    let channels = VesselKind::ALL.into_iter().flat_map(|system| {
-        let normals = growth.normals(system).iter().flat_map(|normal| normal.to_array()).map(f32::to_bits);
-        normals.chain(growth.birth_steps(system).iter().copied()).collect::<Vec<_>>()
+    let channels = Colonization::KINDS.into_iter().flat_map(|kind| {
+        let normals = growth.normals(kind).iter().flat_map(|normal| normal.to_array()).map(f32::to_bits);
+        normals.chain(growth.birth_steps(kind).iter().copied()).collect::<Vec<_>>()
     });
     (hash(growth), channels.collect())
 }
 
 fn hash(growth: &Colonization) -> u64 {
-    hash_trees(VesselKind::ALL.map(|system| growth.tree(system)))
+    hash_trees(Colonization::KINDS.map(|kind| growth.tree(kind)))
 }
 
 fn grown(case: &Case, seed: u64) -> (u64, Vec<u32>) {
     let mut growth = start(case, seed);
     growth.run();
-    let nodes = VesselKind::ALL.map(|system| growth.tree(system).len());
+    let nodes = Colonization::KINDS.map(|kind| growth.tree(kind).len());
     assert!(nodes[0] > 100 && nodes[1] > 1, "{}: {nodes:?} are too few nodes to compare", case.name);
     outcome(&growth)
 }
@@ -63,8 +63,8 @@ fn portions_of_steps_change_nothing() {
                 for _ in 0..portion {
                     growth.step();
                 }
-                for system in VesselKind::ALL {
-                    let _ = (growth.vessels(system), growth.drains(system).count());
+                for kind in Colonization::KINDS {
+                    let _ = (growth.vessels(kind), growth.drains(kind).count());
                 }
             }
             assert_eq!(outcome(&growth), whole, "{} in portions of {portion}", case.name);
@@ -125,7 +125,8 @@ fn a_restart_leaves_no_trace_of_what_was() {
         growth.run();
         // Something quite different in between: other lengths, hence another grid, and other channels in use.
         let other = ColonizationSettings { steps: 8, ..settings().scaled(2.5) };
-        let alone = Roots { venous: Default::default(), ..case.roots.clone() };
+        let mut alone = case.roots.clone();
+        alone.placed.vein = RootPlacement::None;
         growth.restart(other, &alone, 4).expect("settings within limits");
         growth.step();
         growth.restart(settings(), &case.roots, 7).expect("settings within limits");
@@ -169,7 +170,8 @@ fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
     let outer = colon.mesh.part(colon.outer.clone());
     let outer = TriangleMesh::new(outer.positions, outer.triangles, None)?;
     let beside = |sites: &[Vec3]| RootPlacement::Nearest(sites.to_vec());
-    let colon_roots = Some([beside(&colon.roots.arterial), beside(&colon.roots.venous)]);
+    let (artery, vein) = (beside(&colon.roots.arterial), beside(&colon.roots.venous));
+    let colon_roots = Some(RootPlacements { artery, vein, ..RootPlacements::default() });
     let cases: [(PresetName, Arc<dyn Tissue>, _, u64); 4] = [
         (PresetName::ReferenceDisc, Arc::new(Disc::flat(0.5)?), None, 0x42fc_d56c_82cf_1345),
         (PresetName::ReferenceBall, Arc::new(Ball::new(Vec3::ZERO, 0.5)?), None, 0x2b2b_c0bc_618a_8157),
@@ -178,9 +180,9 @@ fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
     ];
     for (name, tissue, roots, expected) in cases {
         let preset = name.load();
-        let [arterial, venous] = roots.unwrap_or([preset.arterial_roots, preset.venous_roots]);
-        let roots = Roots { arterial, venous, given: [None, None] };
-        let settings = if preset.fit { preset.settings.fit(tissue.extent()) } else { preset.settings };
+        let generator = preset.generator_for(tissue.extent());
+        let settings = generator.colonization().expect("presets colonize").clone();
+        let roots = roots.map_or_else(|| preset.roots(), Roots::from);
         let mut growth = Colonization::new(tissue, settings, &roots, 0)?;
         growth.run();
         assert_eq!(hash(&growth), expected, "{name}: {:#018x}", hash(&growth));

@@ -1,7 +1,7 @@
 //! ECS glue: vessels grow on organ entities, frame by frame, and can be cut, bleed and follow their organ. No drawing.
 //!
 //! In: an entity with a `Mesh3d` and a [`Vasculature`]. Out: a vessel entity for each kind of vessels, child of the organ,
-//! with the tree in [`Vessels`] and what changed in [`SegmentChanges`]; the state of things in [`GrowthProgress`] and
+//! with the tree in [`Vessels`] and what changed in [`ChangeLog`]; the state of things in [`GrowthProgress`] and
 //! messages.
 //!
 //! What goes beyond growth is asked for by components on the organ: [`Cuttable`] for surgery through [`CuttableVessels`],
@@ -16,14 +16,17 @@
 //! | [`DeformationPlugin`] | `deformation` | deformed organs → moved [`Vessels`] |
 //! | [`SurgeryPlugin`] | `surgery` | [`CuttableVessels`], [`VesselCommand`]s → [`VesselWounds`], [`OpenEnd`] entities |
 //! | [`CirculationPlugin`] | `circulation` | [`VesselWounds`] → flow, bleeding, supply of the tissue |
+//! | [`ScenePlugin`] | `scene` | [`PresetAsset`]s → [`Vasculature`]; what is kept of an organ that is saved |
 //! | [`VesselsPlugin`] | `vessels` | what all of them need; they add it themselves |
 
 mod announcer;
 mod circulation;
 mod deformation;
 mod growth;
+mod job;
 mod order;
 mod organ;
+mod scene;
 mod surgery;
 mod vessels;
 
@@ -37,13 +40,15 @@ pub use growth::{
     GrowthFrame, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthStarted, GrowthState, OrganGrowthError, Vasculature,
     diagnostics,
 };
+pub use job::{JobMode, JobSettings};
 pub use order::VesselSystems;
 pub use organ::{OrganMeshError, RestMesh, triangle_mesh};
+pub use scene::{PresetAsset, PresetLoadError, PresetLoader, ScenePlugin, VesselPreset};
 pub use surgery::{
     Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, Stroke, StrokeId,
     SurgeryPlugin, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,
 };
 pub use vessels::{
-    OrganVessels, SegmentChanges, SegmentColoring, VesselAppearance, VesselIndex, VesselPicker, VesselPlace,
-    VesselWounds, Vessels, VesselsOf, VesselsPlugin,
+    ChangeCursor, ChangeLog, Changes, OrganVessels, SegmentColoring, VesselAppearance, VesselIndex, VesselPicker,
+    VesselPlace, VesselWounds, Vessels, VesselsOf, VesselsPlugin,
 };

@@ -76,7 +76,8 @@ impl MaterialExtension for SegmentExtension {
 ///
 /// Change this resource before vessels appear, or the material of one vessel entity at any time: see
 /// [`SegmentMaterial`]. Base colours multiply the colours of the segments, so they stay white unless a tint is wanted.
-#[derive(Resource, Clone, Debug)]
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(Resource, Default, Clone, Debug)]
 pub struct VesselMaterials(pub ByKind<StandardMaterial>);
 
 impl Default for VesselMaterials {

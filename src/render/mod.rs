@@ -1,6 +1,6 @@
 //! Drawing: vessels as instanced segments, lit by Bevy's own materials.
 //!
-//! In: [`Vessels`](crate::plugin::Vessels) and the chunks of them that [`SegmentChanges`](crate::plugin::SegmentChanges)
+//! In: [`Vessels`](crate::plugin::Vessels) and the chunks of them that [`ChangeLog`](crate::plugin::ChangeLog)
 //! marks. Out: a picture, with shadows, prepasses and multisampling.
 //!
 //! A vessel entity, however large, is a handful of chunk entities that share a few meshes: many copies of a template cone
@@ -49,7 +49,8 @@ use upload::{SegmentWrites, extract_writes, queue_scatter_pipeline, write_segmen
 /// Draws the segments of all vessel entities.
 ///
 /// Part of [`VesselPlugin`](crate::VesselPlugin). Add it after Bevy's `DefaultPlugins`: without a renderer it does nothing.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct SegmentRenderPlugin {
     /// Corners of a vessel's cross-section.
     ///
@@ -184,7 +185,8 @@ fn build_render_app(app: &mut App) {
 pub struct SegmentSystems;
 
 /// What the GPU can take. Present only where segments are drawn.
-#[derive(Resource, Clone, Copy, Debug)]
+#[derive(Resource, Clone, Copy, Debug, Reflect)]
+#[reflect(Resource, Clone, Debug)]
 pub struct SegmentLimits {
     max_segments: usize,
     segments_per_chunk: usize,

@@ -8,7 +8,10 @@ use super::{
     upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
-    plugin::{SegmentChanges, SegmentColoring, SegmentSupply, VesselAppearance, VesselWounds, Vessels, VesselsOf},
+    plugin::{
+        ChangeCursor, ChangeLog, Changes, SegmentColoring, SegmentSupply, VesselAppearance, VesselWounds, Vessels,
+        VesselsOf,
+    },
     synthesis::{
         instances::{SegmentColors, SegmentInstance, segment_instance},
         tree::VesselKind,
@@ -31,6 +34,8 @@ use bevy::{
 pub struct SegmentBuffer {
     pub(super) buffer: Handle<ShaderBuffer>,
     material: Handle<SegmentMaterial>,
+    /// The changes that have been drawn.
+    drawn: ChangeCursor,
     /// Segments that the buffer has room for.
     capacity: usize,
     /// Slots that may hold something else than hidden segments.
@@ -166,6 +171,7 @@ pub(super) fn attach_buffers(
         commands.entity(entity).insert(SegmentBuffer {
             buffer,
             material,
+            drawn: ChangeCursor::default(),
             capacity,
             written: 0,
             chunks: Vec::new(),
@@ -209,7 +215,7 @@ pub(super) struct DrawnVessels {
     entity: Entity,
     vessels: &'static Vessels,
     organ: &'static VesselsOf,
-    changes: &'static mut SegmentChanges,
+    log: &'static ChangeLog,
     wounds: Option<&'static VesselWounds>,
     supply: Option<Ref<'static, SegmentSupply>>,
     segments: &'static mut SegmentBuffer,
@@ -225,7 +231,7 @@ pub(super) fn update_segments(
         let appearance = appearances.get(drawn.organ.0).ok();
         let restyled = drawn.segments.look.is_none() || appearance.as_ref().is_some_and(Ref::is_changed);
         let blanched = drawn.segments.follows_supply() && drawn.supply.as_ref().is_some_and(Ref::is_changed);
-        if drawn.changes.is_empty() && !restyled && !blanched {
+        if drawn.segments.drawn.is_current(drawn.log) && !restyled && !blanched {
             continue;
         }
         let look = match appearance {
@@ -235,16 +241,15 @@ pub(super) fn update_segments(
         let (vessels, segments) = (drawn.vessels, &mut *drawn.segments);
         let nodes = vessels.tree().len();
         let supply = drawn.supply.as_ref().map_or(&[][..], |supply| &supply.segments[..]);
-        let changes = drawn.changes.bypass_change_detection();
-        segments.adopt(look, vessels, supply, changes);
+        let mut changes = segments.drawn.read(drawn.log);
+        segments.adopt(look, vessels, supply, &mut changes);
         let wounds = drawn.wounds.map(|wounds| &**wounds);
-        segments.stumps.update(wounds, vessels, &segments.colors, changes, nodes);
+        segments.stumps.update(wounds, vessels, &segments.colors, &changes, nodes);
         let len = store.drawable(drawn.entity, nodes, segments);
         store.resize(segments, len);
-        store.write(vessels, changes, segments, len);
+        store.write(vessels, &changes, segments, len);
         store.fit_chunks(drawn.entity, segments, len);
         store.write_stumps(drawn.entity, segments);
-        changes.clear();
     }
 }
 
@@ -254,20 +259,20 @@ impl SegmentBuffer {
         matches!(self.look, Some(Look::Supply(_)))
     }
 
-    /// Adopts look and supply, and marks the segments that have another colour now.
-    fn adopt(&mut self, look: Look, vessels: &Vessels, supply: &[f32], changes: &mut SegmentChanges) {
+    /// Adopts look and supply, and adds the segments that have another colour now.
+    fn adopt(&mut self, look: Look, vessels: &Vessels, supply: &[f32], changes: &mut Changes) {
         let (tree, births) = (vessels.tree(), vessels.birth_steps());
         if self.look != Some(look) {
             self.look = Some(look);
             self.colors = look.colors();
             self.colors.refresh(tree, births, [0..tree.len()]);
             self.colors.set_supply(supply);
-            changes.mark_all();
+            changes.add_all();
             return;
         }
         let recolored = self.colors.refresh(tree, births, changes.dirty_ranges(tree.len()));
         for recolored in recolored.into_iter().chain(self.colors.set_supply(supply)) {
-            recolored.for_each(|node| changes.mark_node(node));
+            recolored.for_each(|node| changes.add(node));
         }
     }
 }
@@ -311,7 +316,7 @@ impl SegmentStore<'_, '_> {
     }
 
     /// Queues the segments that changed, and takes them into their chunks.
-    fn write(&mut self, vessels: &Vessels, changes: &SegmentChanges, segments: &mut SegmentBuffer, len: usize) {
+    fn write(&mut self, vessels: &Vessels, changes: &Changes, segments: &mut SegmentBuffer, len: usize) {
         let slots = self.templates.slots();
         if changes.is_all() {
             segments.contents.fill(ChunkContents::default());

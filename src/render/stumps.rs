@@ -13,7 +13,7 @@ use super::{
     upload::SegmentWrite,
 };
 use crate::{
-    plugin::{SegmentChanges, Vessels},
+    plugin::{Changes, Vessels},
     synthesis::{
         instances::{SegmentColors, SegmentInstance},
         tree::NodeId,
@@ -68,7 +68,7 @@ impl Stumps {
         wounds: Option<&Wounds>,
         vessels: &Vessels,
         colors: &SegmentColors,
-        changes: &SegmentChanges,
+        changes: &Changes,
         len: usize,
     ) {
         let is_healed = |node: NodeId| changes.contains(node.index()) && wounds.is_none_or(|all| !all.is_redrawn(node));

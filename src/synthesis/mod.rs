@@ -58,6 +58,7 @@ pub mod instances;
 pub mod io;
 pub mod mesh;
 pub mod organ;
+pub mod pace;
 mod parallel;
 pub mod preset;
 pub mod random;

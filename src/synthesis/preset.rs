@@ -14,6 +14,7 @@ use std::str::FromStr;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Preset {
     /// Which form of presets it has. A file without it has the present form.
     ///

@@ -4,13 +4,13 @@ mod torus;
 
 use bevy_math::{Vec2, Vec3};
 use bevy_vessels::synthesis::{
-    roots::{RootPlacement, Roots},
+    roots::{RootPlacement, RootPlacements, Roots},
     tissue::{Ball, Cuboid, Disc, Ellipsoid, MeshSurface, MeshVolume, Rectangle, Tissue},
 };
 use std::sync::Arc;
 use torus::torus;
 
-/// A tissue of about unit size, with a root for each system.
+/// A tissue of about unit size, with a root for each kind of vessels.
 pub struct Case {
     /// What messages call it.
     pub name: &'static str,
@@ -22,9 +22,10 @@ pub struct Case {
 
 impl Case {
     fn new(name: &'static str, tissue: impl Tissue + 'static) -> Self {
-        let arterial = RootPlacement::Nearest(vec![Vec3::new(-0.5, 0.0, 0.0)]);
-        let venous = RootPlacement::Nearest(vec![Vec3::new(-0.495, 0.05, 0.0)]);
-        Self { name, tissue: Arc::new(tissue), roots: Roots { arterial, venous, given: [None, None] } }
+        let artery = RootPlacement::Nearest(vec![Vec3::new(-0.5, 0.0, 0.0)]);
+        let vein = RootPlacement::Nearest(vec![Vec3::new(-0.495, 0.05, 0.0)]);
+        let roots = RootPlacements { artery, vein, ..RootPlacements::default() }.into();
+        Self { name, tissue: Arc::new(tissue), roots }
     }
 }
 

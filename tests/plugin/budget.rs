@@ -33,7 +33,7 @@ fn any_budget_gives_the_vessels_of_grow_now() {
 fn organs_share_the_budget_and_none_starves() {
     let mut app = headless(GrowthBudget::Steps(3));
     let mut short = quick();
-    short.settings.steps = 5;
+    settings_of(&mut short).steps = 5;
     let organs = [spawn(&mut app, quick()), spawn(&mut app, short), spawn(&mut app, quick().with_seed(2))];
     for organ in organs {
         send(&mut app, organ, GrowthAction::Pause);

@@ -1,8 +1,9 @@
-//! Wishes and meshes that change while vessels grow, or come late.
+//! Wishes and meshes that change while vessels grow, or come late; and who reads what changed in the vessels.
 
+use crate::operating_field::*;
 use crate::*;
 use bevy_vessels::{
-    plugin::{GrowthStarted, SegmentChanges},
+    plugin::{ChangeCursor, ChangeLog, Changes, Cuttable, GrowthStarted, VesselsOf},
     synthesis::tissue::Tissue,
 };
 use std::ptr;
@@ -31,7 +32,7 @@ fn another_seed_or_setting_restarts_at_the_next_frame_on_the_same_tissue() {
     assert_ne!(before, trees(app.world(), organ));
     change(&mut app, organ, |wish| {
         wish.seed = 0;
-        wish.settings.arterial.step_length *= 0.9;
+        settings_of(wish).arterial.step_length *= 0.9;
     });
     app.update();
     assert_eq!(progress(app.world(), organ).step, 2);
@@ -134,9 +135,31 @@ fn taking_the_mesh_away_waits_for_another() {
     assert_published(app.world(), organ);
 }
 
-/// Copies what is marked, as a renderer does: then the copy is right, and nothing was marked for nothing.
+/// A reader that copies what changed, as a renderer does, in every so many frames.
+#[derive(Default)]
+struct Copier {
+    period: usize,
+    cursor: ChangeCursor,
+    copy: Vec<[f32; 8]>,
+}
+
+impl Copier {
+    /// Copies: then the copy is right, and nothing was marked for nothing.
+    #[track_caller]
+    fn read(&mut self, log: &ChangeLog, tree: &VesselTree) {
+        let now: Vec<_> = (0..tree.len()).map(|node| segment(tree, node)).collect();
+        self.copy.resize(tree.len(), [f32::NAN; 8]);
+        for node in self.cursor.read(log).dirty_ranges(tree.len()).flatten() {
+            assert_ne!(self.copy[node], now[node], "segment {node} has not changed in {} frames", self.period);
+            self.copy[node] = now[node];
+        }
+        assert_eq!(self.copy, now, "every {} frames", self.period);
+    }
+}
+
+/// Readers at different frame rates: each gets exactly what its copy needs, whatever the others have read.
 #[test]
-fn segment_changes_are_exactly_what_a_copy_needs() {
+fn each_reader_gets_exactly_what_its_copy_needs() {
     [1, 7].into_iter().for_each(assert_changes_exact);
 }
 
@@ -144,32 +167,102 @@ fn segment_changes_are_exactly_what_a_copy_needs() {
 fn assert_changes_exact(steps: u32) {
     let mut app = headless(GrowthBudget::Steps(steps));
     let mut wish = quick();
-    wish.settings = wish.settings.scaled(0.6);
-    wish.settings.steps = 150;
-    wish.settings.samples = 4000;
+    wish.generator = wish.generator.scaled(0.6);
+    let settings = settings_of(&mut wish);
+    settings.steps = 150;
+    settings.samples = 4000;
     let organ = spawn(&mut app, wish);
-    let mut copy: Vec<[f32; 8]> = Vec::new();
+    let mut readers = [1, 2, 5].map(|period| Copier { period, ..Copier::default() });
+    let mut frame = 0;
     run_until(&mut app, "the end", |world| {
+        frame += 1;
         if let Some(entity) = vessel_entity(world, organ, VesselKind::Artery) {
             let tree = published(world, organ, VesselKind::Artery).tree().clone();
-            let now: Vec<_> = (0..tree.len()).map(|node| segment(&tree, node)).collect();
-            let mut changes = world.get_mut::<SegmentChanges>(entity).expect("vessels keep their changes");
-            copy.resize(tree.len(), [f32::NAN; 8]);
-            for range in changes.dirty_ranges(tree.len()) {
-                for node in range {
-                    assert_ne!(copy[node], now[node], "segment {node} has not changed");
-                    copy[node] = now[node];
-                }
-            }
-            changes.clear();
-            assert_eq!(copy, now);
+            let log = world.get::<ChangeLog>(entity).expect("vessels keep their changes");
+            readers.iter_mut().filter(|reader| frame % reader.period == 0).for_each(|reader| reader.read(log, &tree));
         }
         progress(world, organ).is_finished()
     });
-    assert!(copy.len() > 2500, "{} segments are too few to tell", copy.len());
     app.update();
-    let entity = vessel_entity(app.world(), organ, VesselKind::Artery).expect("the system has vessels");
-    assert!(app.world().get::<SegmentChanges>(entity).is_some_and(SegmentChanges::is_empty), "all is at rest");
+    let entity = vessel_entity(app.world(), organ, VesselKind::Artery).expect("the kind has vessels");
+    let log = app.world().get::<ChangeLog>(entity).expect("vessels keep their changes");
+    assert!(readers[0].cursor.is_current(log), "all is at rest");
+    let tree = published(app.world(), organ, VesselKind::Artery).tree().clone();
+    assert!(tree.len() > 2500, "{} segments are too few to tell", tree.len());
+    for mut reader in readers {
+        reader.read(log, &tree);
+        assert!(reader.cursor.read(log).is_empty());
+    }
+}
+
+/// What a reader finds that has seen everything before.
+fn changes_since(app: &App, cursor: &mut ChangeCursor, entity: Entity) -> Changes {
+    cursor.read(app.world().get::<ChangeLog>(entity).expect("vessels keep their changes"))
+}
+
+#[test]
+fn other_vessels_are_changed_throughout() {
+    let mut app = headless(GrowthBudget::Steps(5));
+    let organ = spawn(&mut app, quick());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    let entity = vessel_entity(app.world(), organ, VesselKind::Artery).expect("the kind has vessels");
+    let mut cursor = ChangeCursor::default();
+    assert!(changes_since(&app, &mut cursor, entity).is_all(), "to a reader that comes late");
+    app.update();
+    assert!(changes_since(&app, &mut cursor, entity).is_empty());
+    change(&mut app, organ, |wish| wish.seed = 3);
+    app.update();
+    assert!(changes_since(&app, &mut cursor, entity).is_all(), "after a restart");
+    // By hand, with nothing marked: on another entity, inserted, and written over in place.
+    let other = tube(1.0, 0.1, 100);
+    let vessels = || Vessels::from_tree(VesselKind::Artery, &other, &[]);
+    let entity = app.world_mut().spawn((VesselsOf(organ), vessels())).id();
+    assert!(changes_since(&app, &mut cursor, entity).is_all(), "of another entity");
+    assert!(changes_since(&app, &mut cursor, entity).is_empty());
+    app.world_mut().entity_mut(entity).insert(vessels());
+    assert!(changes_since(&app, &mut cursor, entity).is_all(), "inserted");
+    let same = app.world().get::<Vessels>(entity).cloned().expect("it has vessels");
+    app.world_mut().entity_mut(entity).insert(same);
+    assert!(changes_since(&app, &mut cursor, entity).is_all(), "even the same");
+    *app.world_mut().get_mut::<Vessels>(entity).expect("it has vessels") = vessels();
+    app.update();
+    assert!(changes_since(&app, &mut cursor, entity).is_all(), "written over");
+    app.update();
+    assert!(changes_since(&app, &mut cursor, entity).is_empty());
+}
+
+#[test]
+fn vessels_updated_by_hand_mark_what_differs() {
+    let mut app = headless(GrowthBudget::default());
+    let tree = tube(1.0, 0.1, 100);
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
+    let entity = vessel_entity(app.world(), organ, VesselKind::Artery).expect("the organ has an artery");
+    cut(&mut app, square(Vec3::X * 0.205, Vec3::X, 1.0));
+    let mut cursor = ChangeCursor::default();
+    assert!(!changes_since(&app, &mut cursor, entity).is_empty());
+    let mut update = |app: &mut App, tree: &VesselTree| {
+        let mut query = app.world_mut().query::<(&mut Vessels, &mut ChangeLog)>();
+        let (mut vessels, mut log) = query.get_mut(app.world_mut(), entity).expect("vessels keep their changes");
+        vessels.update_from_tree(tree, &[], &mut log);
+        assert_eq!(vessels.tree(), tree);
+        app.update();
+        changes_since(app, &mut cursor, entity)
+    };
+    let is_cut = |app: &App| !wounds(app.world(), organ, VesselKind::Artery).is_empty();
+    assert!(update(&mut app, &tree).is_empty());
+    let grown = edited(&tree, |positions, parents, radii| {
+        positions[40].y += 0.001;
+        radii[70] *= 0.5;
+        positions.push(Vec3::X * 1.01);
+        parents.push(100);
+        radii.push(0.1);
+    });
+    let changes = update(&mut app, &grown);
+    assert_eq!(changes.dirty_nodes(0..grown.len()).collect::<Vec<_>>(), [40, 41, 70, 71, 101]);
+    assert!(is_cut(&app), "they are the same vessels");
+    let shorter = tube(1.0, 0.1, 50);
+    assert!(update(&mut app, &shorter).is_all());
+    assert!(!is_cut(&app), "they are others");
 }
 
 fn segment(tree: &VesselTree, node: usize) -> [f32; 8] {

@@ -1,6 +1,6 @@
 //! Blood flows in organs of a world, and is lost.
 
-use crate::theatre::*;
+use crate::operating_field::*;
 use crate::*;
 use bevy_vessels::{
     plugin::{
@@ -41,7 +41,7 @@ fn artery(app: &App, organ: Entity) -> Entity {
 /// Poiseuille's law and that of the orifice in series: Δp = R·Q + K·Q².
 #[test]
 fn a_cut_tube_bleeds_what_physics_says_on_the_entity_of_its_end() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
     app.update();
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
@@ -68,7 +68,7 @@ fn a_cut_tube_bleeds_what_physics_says_on_the_entity_of_its_end() {
 
 #[test]
 fn nothing_bleeds_behind_a_clamp_and_messages_say_so() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &fork(0.5))], plain());
     app.update();
     let (mut started, mut stopped) = (MessageCursor::default(), MessageCursor::default());
@@ -105,7 +105,7 @@ fn nothing_bleeds_behind_a_clamp_and_messages_say_so() {
 #[test]
 fn the_loss_hardly_depends_on_the_frame_rate() {
     let losses = [30, 60, 240].map(|rate| {
-        let mut app = theatre(Duration::from_secs_f64(1.0 / f64::from(rate)));
+        let mut app = timed_app(Duration::from_secs_f64(1.0 / f64::from(rate)));
         let pulse = RootPressure::Pulsatile(Pulse::default());
         let organ = grown(&mut app, Perfusion { arterial_pressure: pulse, scale: Scale::CENTIMETRES, ..blood() });
         app.update();
@@ -122,7 +122,7 @@ fn the_loss_hardly_depends_on_the_frame_rate() {
 #[test]
 fn the_same_frames_lose_the_same_to_the_last_bit() {
     let run = || {
-        let mut app = theatre(FRAME);
+        let mut app = timed_app(FRAME);
         let organs = [(); 2].map(|()| grown(&mut app, blood()));
         cut(&mut app, square(Vec3::Y * 0.2, Vec3::Y, 3.0));
         (0..20).for_each(|_| app.update());
@@ -133,7 +133,7 @@ fn the_same_frames_lose_the_same_to_the_last_bit() {
 
 #[test]
 fn organs_below_a_patient_share_the_blood() {
-    let mut app = theatre(Duration::from_millis(200));
+    let mut app = timed_app(Duration::from_millis(200));
     let settings = BloodVolumeSettings { total: Volume::from_ml(20.0), ..BloodVolumeSettings::default() };
     let patient = app.world_mut().spawn((Transform::default(), Patient::new(settings).unwrap())).id();
     let organs = [(); 2].map(|()| {
@@ -158,7 +158,7 @@ fn organs_below_a_patient_share_the_blood() {
 
 #[test]
 fn time_stands_still_while_paused() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
     app.update();
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
@@ -175,7 +175,7 @@ fn time_stands_still_while_paused() {
 
 #[test]
 fn tissue_below_a_cut_lacks_blood_until_it_is_undone() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = grown(&mut app, blood());
     let supply = |app: &App| app.world().get::<OrganSupply>(organ).expect("an organ with blood has a supply").clone();
     run_until(&mut app, "a supply", |world| !world.get::<OrganSupply>(organ).unwrap().vertices.is_empty());
@@ -201,7 +201,7 @@ fn tissue_below_a_cut_lacks_blood_until_it_is_undone() {
 #[test]
 fn a_bed_with_resistance_joins_arteries_and_veins() {
     let venous_supply = |bed: BedSettings| {
-        let mut app = theatre(FRAME);
+        let mut app = timed_app(FRAME);
         let organ = grown(&mut app, Perfusion { bed, ..blood() });
         let veins = vessel_entity(app.world(), organ, VesselKind::Vein).unwrap();
         let supply = |world: &World| world.get::<SegmentSupply>(veins).unwrap().segments.first().copied();
@@ -219,7 +219,7 @@ fn a_bed_with_resistance_joins_arteries_and_veins() {
 
 #[test]
 fn a_regrowth_has_lost_nothing() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = grown(&mut app, blood());
     cut(&mut app, square(Vec3::Y * 0.2, Vec3::Y, 3.0));
     let (bleeding, mut stopped) = (loss(app.world(), organ).bleeding_ends, MessageCursor::default());
@@ -238,7 +238,7 @@ fn a_regrowth_has_lost_nothing() {
 
 #[test]
 fn settings_that_cannot_be_are_named_and_can_be_mended() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let wrong = Perfusion { discharge_coefficient: 1.5, ..plain().1 };
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], (plain().0, wrong));
     let (mut failed, mut failures) = (MessageCursor::default(), Vec::<CirculationFailed>::new());
@@ -257,7 +257,7 @@ fn settings_that_cannot_be_are_named_and_can_be_mended() {
 
 #[test]
 fn an_organ_without_perfusion_does_not_bleed_any_more() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
     app.update();
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
@@ -271,7 +271,7 @@ fn an_organ_without_perfusion_does_not_bleed_any_more() {
 
 #[test]
 fn a_large_organ_bleeds_once_its_network_is_made() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let tree = tube(400.0, 0.5, 20_000);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], plain());
     cut(&mut app, square(Vec3::X * 25.005, Vec3::X, 2.0));

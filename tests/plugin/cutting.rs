@@ -1,6 +1,6 @@
 //! Vessels are cut, closed and healed on organs in a world.
 
-use crate::theatre::*;
+use crate::operating_field::*;
 use crate::*;
 use bevy::math::Affine3A;
 use bevy_vessels::{
@@ -26,14 +26,14 @@ fn hang_askew(app: &mut App, organ: Entity) {
     app.update();
 }
 
-fn to_world(app: &App, organ: Entity, system: VesselKind) -> Affine3A {
-    let vessels = vessel_entity(app.world(), organ, system).expect("the system has vessels");
+fn to_world(app: &App, organ: Entity, kind: VesselKind) -> Affine3A {
+    let vessels = vessel_entity(app.world(), organ, kind).expect("the kind has vessels");
     app.world().get::<GlobalTransform>(vessels).expect("vessels are somewhere").affine()
 }
 
 /// Segments whose ends lie on both sides of a plane of the world.
-fn across_plane(app: &App, organ: Entity, system: VesselKind, point: Vec3, normal: Vec3) -> Vec<NodeId> {
-    let (vessels, to_world) = (published(app.world(), organ, system), to_world(app, organ, system));
+fn across_plane(app: &App, organ: Entity, kind: VesselKind, point: Vec3, normal: Vec3) -> Vec<NodeId> {
+    let (vessels, to_world) = (published(app.world(), organ, kind), to_world(app, organ, kind));
     let side = |node: usize| (to_world.transform_point3(vessels.tree().positions()[node]) - point).dot(normal) > 0.0;
     let crossed = vessels.tree().segments().filter(|&(node, parent)| side(node) != side(parent));
     crossed.map(|(node, _)| NodeId(node as u32)).collect()
@@ -41,27 +41,27 @@ fn across_plane(app: &App, organ: Entity, system: VesselKind, point: Vec3, norma
 
 #[test]
 fn a_blade_of_the_world_severs_what_it_crosses_however_the_organ_hangs() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = grown(&mut app, ());
     hang_askew(&mut app, organ);
     let to_world_now = to_world(&app, organ, VesselKind::Artery);
     assert!(to_world_now.matrix3.determinant() < 0.0, "the organ is mirrored");
     for (number, normal) in [Vec3::new(1.0, 0.2, -0.4), Vec3::new(-0.3, 1.0, 0.5)].into_iter().enumerate() {
         let point = to_world_now.transform_point3(Vec3::new(0.03, -0.05 * number as f32, 0.02));
-        let expected = VesselKind::ALL.map(|system| across_plane(&app, organ, system, point, normal));
+        let expected = KINDS.map(|kind| across_plane(&app, organ, kind, point, normal));
         cut(&mut app, square(point, normal, 100.0));
-        for system in VesselKind::ALL {
-            assert!(!expected[system.index()].is_empty());
-            assert_eq!(severed(app.world(), organ, system), expected[system.index()], "{}", system.name());
+        for kind in KINDS {
+            assert!(!expected[kind.index()].is_empty());
+            assert_eq!(severed(app.world(), organ, kind), expected[kind.index()], "{}", kind.name());
         }
         operate(&mut app, CuttableVessels::undo);
-        assert!(VesselKind::ALL.iter().all(|&system| wounds(app.world(), organ, system).is_empty()));
+        assert!(KINDS.iter().all(|&kind| wounds(app.world(), organ, kind).is_empty()));
     }
 }
 
 #[test]
 fn an_action_goes_to_all_organs_or_to_the_one_that_it_names() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let tree = tube(10.0, 0.1, 5);
     let both = [(VesselKind::Artery, &tree), (VesselKind::Vein, &tree)];
     let organs = [(); 3].map(|()| organ_of(&mut app, &both, Cuttable::default()));
@@ -69,8 +69,8 @@ fn an_action_goes_to_all_organs_or_to_the_one_that_it_names() {
     let mut messages = MessageCursor::default();
     cut(&mut app, blade.clone());
     let done: Vec<VesselOperation> = drain(app.world(), &mut messages);
-    assert_eq!(done.len(), 6, "two systems of three organs");
-    assert!(done.iter().all(|operation| (operation.kind, operation.report.severed) == (OperationKind::Cut, 1)));
+    assert_eq!(done.len(), 6, "two kinds of three organs");
+    assert!(done.iter().all(|operation| (operation.operation, operation.report.severed) == (OperationKind::Cut, 1)));
     assert!(organs.iter().all(|organ| done.iter().filter(|operation| operation.organ == *organ).count() == 2));
     operate(&mut app, |vessels| vessels.request(VesselCommand::new(VesselAction::UndoAll).on(organs[1])));
     let is_whole = |app: &App, organ| severed(app.world(), organ, VesselKind::Vein).is_empty();
@@ -99,7 +99,7 @@ fn messages_and_the_resource_do_the_same() {
         ]
     };
     let results = [true, false].map(|by_message| {
-        let mut app = theatre(FRAME);
+        let mut app = timed_app(FRAME);
         let organ = grown(&mut app, ());
         let mut messages = MessageCursor::default();
         for action in actions() {
@@ -112,8 +112,8 @@ fn messages_and_the_resource_do_the_same() {
             }
         }
         let reports = drain::<VesselOperation>(app.world(), &mut messages).into_iter().map(|done| done.report);
-        let left = VesselKind::ALL.map(|system| {
-            wounds(app.world(), organ, system).ends(published(app.world(), organ, system).tree()).collect::<Vec<_>>()
+        let left = KINDS.map(|kind| {
+            wounds(app.world(), organ, kind).ends(published(app.world(), organ, kind).tree()).collect::<Vec<_>>()
         });
         (reports.collect::<Vec<_>>(), left)
     });
@@ -128,7 +128,7 @@ fn sweeps(segments: std::ops::Range<u32>) -> impl Iterator<Item = (NodeId, Blade
 
 #[test]
 fn a_stroke_of_many_frames_is_undone_at_once() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(20.0, 0.1, 20))], Cuttable::default());
     cut(&mut app, square(Vec3::X * 18.5, Vec3::X, 1.0));
     let before: Vec<_> = open_ends(&mut app);
@@ -149,7 +149,7 @@ fn a_stroke_of_many_frames_is_undone_at_once() {
     let opened: Vec<_> = open_ends(&mut app).iter().filter(|end| !before.contains(end)).map(|end| end.id).collect();
     operate(&mut app, CuttableVessels::undo);
     let undone: Vec<VesselOperation> = drain(app.world(), &mut messages);
-    let [VesselOperation { kind: OperationKind::Undone, stroke: None, report, .. }] = &undone[..] else {
+    let [VesselOperation { operation: OperationKind::Undone, stroke: None, report, .. }] = &undone[..] else {
         panic!("one operation, not {undone:?}")
     };
     assert_eq!((report.changed.len(), &report.opened), (6, &Vec::new()));
@@ -163,7 +163,7 @@ fn a_stroke_of_many_frames_is_undone_at_once() {
 
 #[test]
 fn strokes_of_two_hands_are_undone_apart_unless_they_meet() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let tree = tube(20.0, 0.1, 20);
     let organs = [(); 2].map(|()| organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default()));
     let severed_of = |app: &App| organs.map(|organ| severed(app.world(), organ, VesselKind::Artery).len());
@@ -199,7 +199,7 @@ fn strokes_of_two_hands_are_undone_apart_unless_they_meet() {
 
 #[test]
 fn open_ends_are_entities_that_face_out_of_the_lumen() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &fork(0.05))], Cuttable::default());
     hang_askew(&mut app, organ);
     let to_world = to_world(&app, organ, VesselKind::Artery);
@@ -209,7 +209,7 @@ fn open_ends_are_entities_that_face_out_of_the_lumen() {
     let [proximal, distal] = ends[..] else { panic!("two ends, not {ends:?}") };
     assert_eq!((proximal.side, distal.side), (EndSide::Proximal, EndSide::Distal));
     for end in [&proximal, &distal] {
-        assert_eq!((end.organ, end.system, end.place.node, end.generation), (organ, VesselKind::Artery, NodeId(2), 1));
+        assert_eq!((end.organ, end.kind, end.place.node, end.bifurcations), (organ, VesselKind::Artery, NodeId(2), 1));
     }
     assert!(proximal.position.y < 0.5 && distal.position.y > 0.5);
     assert!(proximal.direction.distance(Vec3::Y) < 1e-6 && distal.direction.distance(Vec3::NEG_Y) < 1e-6);
@@ -237,7 +237,7 @@ fn open_ends_are_entities_that_face_out_of_the_lumen() {
 
 #[test]
 fn clamps_find_the_nearest_vessel_of_the_world() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let tree = tube(10.0, 0.1, 5);
     let [left, right] = [0.0, 4.0].map(|y| {
         let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
@@ -264,13 +264,13 @@ fn clamps_find_the_nearest_vessel_of_the_world() {
 
 /// Against all segments, one by one, in the world.
 #[test]
-fn the_probe_finds_the_nearest_wall_under_uneven_scale() {
-    let mut app = theatre(FRAME);
+fn the_picker_finds_the_nearest_wall_under_uneven_scale() {
+    let mut app = timed_app(FRAME);
     let organ = grown(&mut app, ());
     hang_askew(&mut app, organ);
-    let probe = app
+    let nearest_place = app
         .world_mut()
-        .register_system(|In((point, reach)): In<(Vec3, f32)>, mut probe: VesselPicker| probe.nearest(point, reach));
+        .register_system(|In((point, reach)): In<(Vec3, f32)>, picker: VesselPicker| picker.nearest(point, reach));
     let to_world = to_world(&app, organ, VesselKind::Artery);
     let scale = to_world.matrix3.determinant().abs().cbrt();
     let mut found = 0;
@@ -279,8 +279,8 @@ fn the_probe_finds_the_nearest_wall_under_uneven_scale() {
         let local = 0.5 * Vec3::new((1.3 * angle).sin(), (2.1 * angle).cos(), (0.7 * angle).sin());
         let (point, reach) = (to_world.transform_point3(local), 0.002 * angle);
         let mut nearest = f32::INFINITY;
-        for system in VesselKind::ALL {
-            let vessels = published(app.world(), organ, system);
+        for kind in KINDS {
+            let vessels = published(app.world(), organ, kind);
             for (node, parent) in vessels.tree().segments() {
                 let [a, b] = [parent, node].map(|node| to_world.transform_point3(vessels.tree().positions()[node]));
                 let share = ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
@@ -288,7 +288,7 @@ fn the_probe_finds_the_nearest_wall_under_uneven_scale() {
                 nearest = nearest.min(distance);
             }
         }
-        let place = app.world_mut().run_system_with(probe, (point, reach)).unwrap();
+        let place = app.world_mut().run_system_with(nearest_place, (point, reach)).unwrap();
         assert_eq!(place.is_some(), nearest <= reach, "point {i}");
         if let Some(place) = place {
             found += 1;
@@ -300,14 +300,14 @@ fn the_probe_finds_the_nearest_wall_under_uneven_scale() {
 
 #[test]
 fn a_regrowth_has_no_wounds() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = grown(&mut app, ());
     cut(&mut app, square(Vec3::ZERO, Vec3::Y, 3.0));
     assert!(!open_ends(&mut app).is_empty());
     app.world_mut().get_mut::<Vasculature>(organ).unwrap().seed = 5;
     app.update();
     assert_eq!(open_ends(&mut app), [], "in the very frame in which the vessels are others");
-    assert!(VesselKind::ALL.iter().all(|&system| wounds(app.world(), organ, system).is_empty()));
+    assert!(KINDS.iter().all(|&kind| wounds(app.world(), organ, kind).is_empty()));
     assert_eq!(app.world().resource::<CuttableVessels>().actions(), 0);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     app.update();
@@ -318,15 +318,16 @@ fn a_regrowth_has_no_wounds() {
 
 #[test]
 fn wounds_stay_while_vessels_go_on_growing() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     app.insert_resource(GrowthBudget::Steps(1));
     let organ = spawn(&mut app, quick());
     app.world_mut().entity_mut(organ).insert(Cuttable::default());
     run_until(&mut app, "half of the steps", |world| progress(world, organ).step == STEPS / 2);
     app.update();
     let (point, normal) = (Vec3::Y * 0.3, Vec3::Y);
-    let first = across_plane(&app, organ, VesselKind::Artery, point, normal);
     cut(&mut app, square(point, normal, 3.0));
+    // A frame's step comes before its cuts, which meet what has just grown.
+    let first = across_plane(&app, organ, VesselKind::Artery, point, normal);
     assert_eq!(severed(app.world(), organ, VesselKind::Artery), first);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     app.update();
@@ -334,7 +335,7 @@ fn wounds_stay_while_vessels_go_on_growing() {
     let all = across_plane(&app, organ, VesselKind::Artery, point, normal);
     assert!(all.len() > first.len(), "vessels went on growing across the cut");
     for end in open_ends(&mut app) {
-        let vessels = published(app.world(), organ, end.system);
+        let vessels = published(app.world(), organ, end.kind);
         assert_eq!(end.position, vessels.tree().position_at(end.place), "ends move with their vessels");
     }
     cut(&mut app, square(point + 1e-3, normal, 3.0));
@@ -344,7 +345,7 @@ fn wounds_stay_while_vessels_go_on_growing() {
 
 #[test]
 fn what_is_despawned_or_no_longer_cuttable_leaves_nothing() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organs = [(); 2].map(|()| grown(&mut app, ()));
     cut(&mut app, square(Vec3::ZERO, Vec3::Y, 3.0));
     let of = |app: &mut App, organ| open_ends(app).iter().filter(|end| end.organ == organ).count();
@@ -365,7 +366,7 @@ fn what_is_despawned_or_no_longer_cuttable_leaves_nothing() {
 
 #[test]
 fn organs_that_cannot_be_cut_are_named_and_others_are_cut() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let tree = tube(10.0, 0.1, 5);
     let flat = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
@@ -394,13 +395,13 @@ fn organs_that_cannot_be_cut_are_named_and_others_are_cut() {
     );
     assert!(
         vessel_entity(app.world(), bare, VesselKind::Artery)
-            .is_some_and(|entity| app.world().get::<VesselIndex>(entity).is_none())
+            .is_some_and(|entity| app.world().get::<VesselIndex>(entity).is_some_and(|index| index.indexed() == 0))
     );
 }
 
 #[test]
 fn a_large_tree_can_be_cut_before_its_index_is_ready() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let tree = tube(30_000.0, 0.1, 30_000);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
     let entity = vessel_entity(app.world(), organ, VesselKind::Artery).unwrap();

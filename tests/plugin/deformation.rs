@@ -1,10 +1,10 @@
 //! Vessels follow an organ that is deformed, and are cut where they are then.
 
-use crate::theatre::*;
+use crate::operating_field::*;
 use crate::*;
 use bevy::math::Affine3A;
 use bevy_vessels::{
-    plugin::{Cuttable, FollowsMesh, FollowsTetrahedra, SegmentChanges},
+    plugin::{ChangeLog, Cuttable, FollowsMesh, FollowsTetrahedra},
     synthesis::{mesh::TetMesh, tissue::TissueMode, tree::NodeId},
 };
 
@@ -39,13 +39,19 @@ fn shear(at: Vec3) -> Vec3 {
 
 #[test]
 fn vessels_follow_in_the_same_frame_and_nothing_grows_again() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = following(&mut app);
     let before = trees(app.world(), organ);
+    let log = |app: &App, kind| {
+        let entity = vessel_entity(app.world(), organ, kind).unwrap();
+        app.world().get::<ChangeLog>(entity).unwrap().now()
+    };
+    let seen = KINDS.map(|kind| log(&app, kind));
     move_vertices(&mut app, organ, shear);
     app.update();
-    for (system, before) in VesselKind::ALL.into_iter().zip(&before) {
-        let vessels = published(app.world(), organ, system);
+    assert!(KINDS.into_iter().zip(seen).all(|(kind, seen)| log(&app, kind) != seen), "they are drawn anew");
+    for (kind, before) in KINDS.into_iter().zip(&before) {
+        let vessels = published(app.world(), organ, kind);
         assert_eq!((vessels.tree().parents(), vessels.tree().radii()), (before.parents(), before.radii()));
         let (min, max) = (vessels.aabb().min(), vessels.aabb().max());
         for (now, before) in vessels.tree().positions().iter().zip(before.positions()) {
@@ -53,8 +59,6 @@ fn vessels_follow_in_the_same_frame_and_nothing_grows_again() {
             assert!(now.distance(shear(*before)) < 0.02, "{now} for {}", shear(*before));
             assert!(Vec3A::from(*now).cmpge(min).all() && Vec3A::from(*now).cmple(max).all());
         }
-        let entity = vessel_entity(app.world(), organ, system).unwrap();
-        assert!(!app.world().get::<SegmentChanges>(entity).unwrap().is_empty(), "they are drawn anew");
     }
     (0..5).for_each(|_| app.update());
     assert_eq!(progress(app.world(), organ).phase, GrowthPhase::Finished, "a deformed mesh is no other mesh");
@@ -62,42 +66,42 @@ fn vessels_follow_in_the_same_frame_and_nothing_grows_again() {
 
 #[test]
 fn what_is_cut_is_where_the_organ_has_it() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = following(&mut app);
     let (point, normal) = (Vec3::Y * 0.2, Vec3::Y);
     cut(&mut app, square(point, normal, 3.0));
-    let severed_before = VesselKind::ALL.map(|system| severed(app.world(), organ, system));
+    let severed_before = KINDS.map(|kind| severed(app.world(), organ, kind));
     move_vertices(&mut app, organ, |at| at + 10.0 * Vec3::X);
     app.update();
     for end in open_ends(&mut app) {
-        let vessels = published(app.world(), organ, end.system);
+        let vessels = published(app.world(), organ, end.kind);
         assert_eq!(end.position, vessels.tree().position_at(end.place));
         assert!(end.position.x > 9.0, "the end is at {}", end.position);
     }
-    assert_eq!(severed_before, VesselKind::ALL.map(|system| severed(app.world(), organ, system)), "the bond survives");
+    assert_eq!(severed_before, KINDS.map(|kind| severed(app.world(), organ, kind)), "the bond survives");
     cut(&mut app, square(-point, normal, 3.0));
-    assert_eq!(severed_before, VesselKind::ALL.map(|system| severed(app.world(), organ, system)), "nothing is there");
-    let ends = |app: &App, system: VesselKind| {
-        let vessels = published(app.world(), organ, system);
-        wounds(app.world(), organ, system).ends(vessels.tree()).count()
+    assert_eq!(severed_before, KINDS.map(|kind| severed(app.world(), organ, kind)), "nothing is there");
+    let ends = |app: &App, kind: VesselKind| {
+        let vessels = published(app.world(), organ, kind);
+        wounds(app.world(), organ, kind).ends(vessels.tree()).count()
     };
-    let ends_before = VesselKind::ALL.map(|system| ends(&app, system));
+    let ends_before = KINDS.map(|kind| ends(&app, kind));
     cut(&mut app, square(-point + 10.0 * Vec3::X, normal, 3.0));
-    for system in VesselKind::ALL {
-        let vessels = published(app.world(), organ, system);
+    for kind in KINDS {
+        let vessels = published(app.world(), organ, kind);
         let below = |node: usize| vessels.tree().positions()[node].y < -point.y;
         let crossed = vessels.tree().segments().filter(|&(node, parent)| below(node) != below(parent));
         let crossed: Vec<NodeId> = crossed.map(|(node, _)| NodeId(node as u32)).collect();
         assert!(!crossed.is_empty());
-        assert!(crossed.iter().all(|&node| wounds(app.world(), organ, system).is_severed(node)));
+        assert!(crossed.iter().all(|&node| wounds(app.world(), organ, kind).is_severed(node)));
         // Others may be gone where an end drew back past their node: each lumen has two ends all the same.
-        assert_eq!(ends(&app, system), ends_before[system.index()] + 2 * crossed.len());
+        assert_eq!(ends(&app, kind), ends_before[kind.index()] + 2 * crossed.len());
     }
 }
 
 #[test]
 fn an_organ_that_comes_to_rest_has_its_vessels_exactly_as_they_grew() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = following(&mut app);
     let before = trees(app.world(), organ);
     let rest: Vec<[f32; 3]> = {
@@ -119,7 +123,7 @@ fn an_organ_that_comes_to_rest_has_its_vessels_exactly_as_they_grew() {
 
 #[test]
 fn vessels_grow_at_rest_while_their_organ_moves() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     app.insert_resource(GrowthBudget::Steps(2));
     let organ = spawn(&mut app, quick());
     app.world_mut().entity_mut(organ).insert(FollowsMesh);
@@ -146,7 +150,7 @@ fn vessels_grow_at_rest_while_their_organ_moves() {
 
 #[test]
 fn another_number_of_vertices_is_another_organ() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = following(&mut app);
     let before = trees(app.world(), organ);
     edit_mesh(&mut app, organ, |mesh| *mesh = Sphere::new(0.5).mesh().uv(40, 20));
@@ -168,7 +172,7 @@ fn another_number_of_vertices_is_another_organ() {
 
 #[test]
 fn an_unstable_soft_body_moves_nothing_and_does_not_stop_the_app() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = following(&mut app);
     let before = trees(app.world(), organ);
     move_vertices(&mut app, organ, |at| at * f32::NAN);
@@ -226,7 +230,7 @@ fn assert_moved(now: &[VesselTree; 2], before: &[VesselTree; 2], to: impl Fn(Vec
 
 #[test]
 fn vessels_within_a_sheared_box_move_as_every_point_of_it() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = solid(&mut app);
     let before = trees(app.world(), organ);
     let inside = before[0].positions().iter().filter(|at| at.abs().max_element() < 0.4).count();
@@ -261,7 +265,7 @@ fn vessels_within_a_sheared_box_move_as_every_point_of_it() {
 
 #[test]
 fn tetrahedra_may_be_replaced_and_taken_away() {
-    let mut app = theatre(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = solid(&mut app);
     let before = trees(app.world(), organ);
     move_tetrahedra(&mut app, organ, |at| at * f32::NAN);

@@ -55,11 +55,11 @@ fn an_organ_from_a_file_grows_once_it_is_loaded() {
     let label = format!("{}#Mesh0/Primitive0", path.display());
     let mesh: Handle<Mesh> = app.world().resource::<AssetServer>().load(label);
     let mut wish = Vasculature::new(PresetName::Colon);
-    wish.settings.steps = 40;
+    settings_of(&mut wish).steps = 40;
     let organ = app.world_mut().spawn((Mesh3d(mesh), wish)).id();
     app.update();
     assert_eq!(progress(app.world(), organ).phase, GrowthPhase::WaitingForMesh);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     assert_published(app.world(), organ);
-    assert!(progress(app.world(), organ).nodes(VesselKind::Artery) > 100);
+    assert!(progress(app.world(), organ).nodes.artery > 100);
 }

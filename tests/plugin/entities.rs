@@ -8,9 +8,11 @@ fn vessel_count(app: &mut App) -> usize {
 }
 
 #[test]
-fn each_system_with_roots_gets_one_entity() {
+fn each_kind_with_roots_gets_one_entity() {
     let mut app = headless(GrowthBudget::default());
-    let organ = spawn(&mut app, quick().with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::None));
+    let mut arteries = quick();
+    arteries.roots.vein = RootPlacement::None;
+    let organ = spawn(&mut app, arteries);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     assert!(vessel_entity(app.world(), organ, VesselKind::Artery).is_some());
     assert_eq!(vessel_count(&mut app), 1);
@@ -21,7 +23,7 @@ fn each_system_with_roots_gets_one_entity() {
     assert_published(app.world(), organ);
     assert_eq!(vessel_count(&mut app), 2);
 
-    app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes").venous_roots = RootPlacement::None;
+    app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes").roots.vein = RootPlacement::None;
     run_until(&mut app, "no veins", |world| vessel_entity(world, organ, VesselKind::Vein).is_none());
     assert_eq!(vessel_count(&mut app), 1);
 }
@@ -31,8 +33,8 @@ fn vessels_are_named_children_of_their_organ() {
     let mut app = headless(GrowthBudget::default());
     let organ = spawn(&mut app, quick());
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
-    for (system, name) in [(VesselKind::Artery, "Arteries"), (VesselKind::Vein, "Veins")] {
-        let entity = vessel_entity(app.world(), organ, system).expect("the system has vessels");
+    for (kind, name) in [(VesselKind::Artery, "Arteries"), (VesselKind::Vein, "Veins")] {
+        let entity = vessel_entity(app.world(), organ, kind).expect("the kind has vessels");
         assert_eq!(app.world().get::<ChildOf>(entity), Some(&ChildOf(organ)));
         assert_eq!(app.world().get::<VesselsOf>(entity), Some(&VesselsOf(organ)));
         assert_eq!(app.world().get::<Name>(entity).map(Name::as_str), Some(name));
@@ -48,7 +50,7 @@ fn vessels_follow_the_organ() {
     let transform = Transform::from_xyz(3.0, -2.0, 1.0).with_scale(Vec3::splat(2.0));
     app.world_mut().entity_mut(organ).insert(transform);
     (0..3).for_each(|_| app.update());
-    let entity = vessel_entity(app.world(), organ, VesselKind::Vein).expect("the system has vessels");
+    let entity = vessel_entity(app.world(), organ, VesselKind::Vein).expect("the kind has vessels");
     let global = app.world().get::<GlobalTransform>(entity).map(GlobalTransform::compute_transform);
     assert_eq!(global, Some(transform));
     assert_eq!(before, trees(app.world(), organ), "moving an organ does not grow it again");
@@ -104,19 +106,18 @@ fn removing_the_vasculature_removes_the_vessels_and_adding_it_grows_them_again()
 }
 
 #[test]
-fn appearance_hides_and_shows_systems() {
+fn appearance_hides_and_shows_kinds() {
     let mut app = headless(GrowthBudget::default());
     let organ = spawn(&mut app, quick());
-    app.world_mut().get_mut::<VesselAppearance>(organ).expect("an organ has a look").show_venous = false;
+    app.world_mut().get_mut::<VesselAppearance>(organ).expect("an organ has a look").shown.vein = false;
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
-    let visibility = |app: &App, system| {
-        vessel_entity(app.world(), organ, system).and_then(|entity| app.world().get::<Visibility>(entity).copied())
+    let visibility = |app: &App, kind| {
+        vessel_entity(app.world(), organ, kind).and_then(|entity| app.world().get::<Visibility>(entity).copied())
     };
     assert_eq!(visibility(&app, VesselKind::Artery), Some(Visibility::Inherited));
     assert_eq!(visibility(&app, VesselKind::Vein), Some(Visibility::Hidden));
     let mut look = app.world_mut().get_mut::<VesselAppearance>(organ).expect("an organ has a look");
-    look.set_shown(VesselKind::Artery, false);
-    look.set_shown(VesselKind::Vein, true);
+    (look.shown.artery, look.shown.vein) = (false, true);
     app.update();
     assert_eq!(visibility(&app, VesselKind::Artery), Some(Visibility::Hidden));
     assert_eq!(visibility(&app, VesselKind::Vein), Some(Visibility::Inherited));

@@ -100,10 +100,11 @@ fn a_mesh_file_that_is_missing_is_named() {
 #[test]
 fn roots_far_away_are_named() {
     let mut app = headless(GrowthBudget::default());
-    let far = RootPlacement::Exact(vec![Vec3::new(1234.5, 0.0, 0.0)]);
-    let organ = spawn(&mut app, quick().with_roots(far, RootPlacement::Beside));
+    let mut far = quick();
+    far.roots.artery = RootPlacement::Exact(vec![Vec3::new(1234.5, 0.0, 0.0)]);
+    let organ = spawn(&mut app, far);
     let error = failure(&mut app, organ).error;
-    assert!(matches!(error, OrganGrowthError::Growth(_)), "{error}");
+    assert!(matches!(error, OrganGrowthError::Generator(_)), "{error}");
     assert!(error.to_string().contains("1234.5"), "{error}");
     let mut wish = app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes");
     *wish = quick();
@@ -114,7 +115,7 @@ fn roots_far_away_are_named() {
 fn settings_out_of_range_are_named_and_mended_at_the_next_frame() {
     let mut app = headless(GrowthBudget::Steps(1));
     let mut wish = quick();
-    wish.settings.arterial.kill_distance = -1.0;
+    settings_of(&mut wish).arterial.kill_distance = -1.0;
     let organ = spawn(&mut app, wish);
     let error = failure(&mut app, organ).error;
     assert!(error.to_string().contains("kill_distance"), "{error}");

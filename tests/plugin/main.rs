@@ -9,7 +9,8 @@ mod desktop;
 mod entities;
 mod errors;
 mod growth;
-mod theatre;
+mod operating_field;
+mod picking;
 mod units;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};
@@ -20,8 +21,9 @@ use bevy_vessels::{
         OrganVessels, Vasculature, Vessels,
     },
     synthesis::{
+        colonization::{Colonization, ColonizationSettings},
         preset::PresetName,
-        roots::RootPlacement,
+        roots::{RootPlacement, RootPlacements},
         tree::{VesselKind, VesselTree},
     },
 };
@@ -32,6 +34,8 @@ use std::{
 
 /// Steps of the growths in these tests.
 const STEPS: u32 = 30;
+/// The kinds of vessels that they have.
+const KINDS: [VesselKind; 2] = Colonization::KINDS;
 
 /// An app as small as vessels allow.
 fn headless(budget: GrowthBudget) -> App {
@@ -51,11 +55,18 @@ fn headless(budget: GrowthBudget) -> App {
 
 /// Vessels that grow quickly.
 fn quick() -> Vasculature {
+    let artery = RootPlacement::Nearest(vec![Vec3::Y]);
     let mut vasculature =
-        Vasculature::new(PresetName::Paper).with_roots(RootPlacement::Nearest(vec![Vec3::Y]), RootPlacement::Beside);
-    vasculature.settings.steps = STEPS;
-    vasculature.settings.samples = 500;
+        Vasculature::new(PresetName::Paper).with_roots(RootPlacements { artery, ..RootPlacements::default() });
+    let settings = settings_of(&mut vasculature);
+    settings.steps = STEPS;
+    settings.samples = 500;
     vasculature
+}
+
+/// The settings of vessels that are grown by space colonization, as those of all presets are.
+fn settings_of(vasculature: &mut Vasculature) -> &mut ColonizationSettings {
+    vasculature.generator.colonization_mut().expect("presets colonize")
 }
 
 fn sphere() -> Mesh {
@@ -101,20 +112,29 @@ fn drain<M: Message + Clone>(world: &World, cursor: &mut MessageCursor<M>) -> Ve
     cursor.read(world.resource::<Messages<M>>()).cloned().collect()
 }
 
-/// The vessel entity of a system.
-fn vessel_entity(world: &World, organ: Entity, system: VesselKind) -> Option<Entity> {
+/// The vessel entity of a kind of an organ.
+fn vessel_entity(world: &World, organ: Entity, kind: VesselKind) -> Option<Entity> {
     let vessels = world.get::<OrganVessels>(organ)?;
-    vessels.entities().iter().copied().find(|&entity| world.get::<VesselSystem>(entity) == Some(&VesselSystem(system)))
+    let is_of_kind = |entity| world.get::<Vessels>(entity).is_some_and(|vessels| vessels.kind() == kind);
+    vessels.entities().iter().copied().find(|&entity| is_of_kind(entity))
 }
 
-/// A copy of what is published of a system.
-fn published(world: &World, organ: Entity, system: VesselKind) -> Vessels {
-    let entity = vessel_entity(world, organ, system).expect("the system has vessels");
+/// A copy of what is published of a kind.
+fn published(world: &World, organ: Entity, kind: VesselKind) -> Vessels {
+    let entity = vessel_entity(world, organ, kind).expect("the kind has vessels");
     world.get::<Vessels>(entity).expect("a vessel entity has vessels").clone()
 }
 
 fn trees(world: &World, organ: Entity) -> [VesselTree; 2] {
-    VesselKind::ALL.map(|system| published(world, organ, system).tree().clone())
+    KINDS.map(|kind| published(world, organ, kind).tree().clone())
+}
+
+/// A tree with other positions and radii, and more nodes.
+fn edited(tree: &VesselTree, edit: impl FnOnce(&mut Vec<Vec3>, &mut Vec<u32>, &mut Vec<f32>)) -> VesselTree {
+    let (mut positions, mut parents, mut radii) =
+        (tree.positions().to_vec(), tree.parents().to_vec(), tree.radii().to_vec());
+    edit(&mut positions, &mut parents, &mut radii);
+    VesselTree::from_arrays(positions, parents, radii).expect("parents come first")
 }
 
 /// Asserts that what is published is what the growth has, node by node.
@@ -122,10 +142,10 @@ fn trees(world: &World, organ: Entity) -> [VesselTree; 2] {
 fn assert_published(world: &World, organ: Entity) {
     let state = world.get::<GrowthState>(organ).expect("an organ has a state");
     let growth = state.growth().expect("the growth has started");
-    for system in VesselKind::ALL {
-        let vessels = published(world, organ, system);
-        assert_eq!(vessels.tree(), &growth.vessels(system), "{}", system.name());
-        assert_eq!(vessels.birth_steps(), growth.birth_steps(system));
+    for kind in KINDS {
+        let (vessels, grown) = (published(world, organ, kind), growth.trees()[kind].expect("the kind grows"));
+        assert_eq!(vessels.tree(), &grown.vessels(), "{}", kind.name());
+        assert_eq!(vessels.birth_steps(), grown.birth_steps);
         let (min, max) = (vessels.aabb().min(), vessels.aabb().max());
         for (position, radius) in vessels.tree().positions().iter().zip(vessels.tree().radii()) {
             let position = Vec3A::from(*position);

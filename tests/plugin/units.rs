@@ -1,6 +1,6 @@
 //! One organ in metres, in millimetres and as a toy: its vessels, and what they bleed.
 
-use crate::theatre::*;
+use crate::operating_field::*;
 use crate::*;
 use bevy_vessels::{
     plugin::{BloodLoss, Perfusion},
@@ -31,13 +31,13 @@ fn bled(app: &mut App, organ: Entity, radius: f32) -> BloodLoss {
 #[test]
 fn an_organ_grows_and_bleeds_alike_in_any_unit() {
     let found = UNITS.map(|units| {
-        let mut app = theatre(FRAME);
+        let mut app = timed_app(FRAME);
         let radius = (SIZE * units) as f32;
         let mesh = add_mesh(&mut app, Sphere::new(radius).mesh().uv(32, 18));
         let wish = Vasculature { seed: 3, ..Vasculature::default() };
         let organ = app.world_mut().spawn((Mesh3d(mesh), wish, blood_in(units))).id();
         run_to_phase(&mut app, organ, GrowthPhase::Finished);
-        let nodes = progress(app.world(), organ).nodes;
+        let nodes = KINDS.map(|kind| progress(app.world(), organ).nodes[kind]);
         let loss = bled(&mut app, organ, radius);
         assert!(loss.bleeding_ends > 50, "{loss:?}");
         (nodes, loss)
@@ -58,12 +58,12 @@ fn an_organ_grows_and_bleeds_alike_in_any_unit() {
 /// With the same tree, nothing but the unit differs.
 #[test]
 fn a_tree_bleeds_the_same_in_any_unit() {
-    let mut organ_in_metres = theatre(FRAME);
+    let mut organ_in_metres = timed_app(FRAME);
     let organ = spawn(&mut organ_in_metres, quick());
     run_to_phase(&mut organ_in_metres, organ, GrowthPhase::Finished);
     let trees = trees(organ_in_metres.world(), organ);
     let losses = UNITS.map(|units| {
-        let mut app = theatre(FRAME);
+        let mut app = timed_app(FRAME);
         // The tree is that of a ball of radius 0.5.
         let factor = (2.0 * SIZE * units) as f32;
         let scaled = trees.each_ref().map(|tree| {
@@ -71,8 +71,8 @@ fn a_tree_bleeds_the_same_in_any_unit() {
             let radii = tree.radii().iter().map(|&radius| radius * factor).collect();
             VesselTree::from_arrays(positions, tree.parents().to_vec(), radii).expect("a tree")
         });
-        let of_systems = [(VesselKind::Artery, &scaled[0]), (VesselKind::Vein, &scaled[1])];
-        let organ = organ_of(&mut app, &of_systems, blood_in(units));
+        let of_kinds = [(VesselKind::Artery, &scaled[0]), (VesselKind::Vein, &scaled[1])];
+        let organ = organ_of(&mut app, &of_kinds, blood_in(units));
         bled(&mut app, organ, 0.5 * factor)
     });
     let [first, others @ ..] = losses;

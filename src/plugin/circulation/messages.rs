@@ -5,10 +5,19 @@
 
 use crate::synthesis::haemodynamics::{EndSide, FlowError};
 use crate::synthesis::wound::EndId;
-use bevy::ecs::{entity::Entity, event::EntityEvent, message::Message};
+use bevy::{
+    ecs::{
+        entity::Entity,
+        event::EntityEvent,
+        message::Message,
+        reflect::{ReflectEvent, ReflectMessage},
+    },
+    reflect::Reflect,
+};
 
 /// An open end begins to bleed. Also an event on the organ, for observers.
-#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct BleedingStarted {
     /// The organ.
     #[event_target]
@@ -25,7 +34,8 @@ pub struct BleedingStarted {
 
 /// An open end bleeds no more: it has clotted, has no pressure left, or was closed. Also an event on the
 /// organ, for observers.
-#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct BleedingStopped {
     /// The organ.
     #[event_target]
@@ -42,7 +52,8 @@ pub struct BleedingStopped {
 
 /// The blood of an organ can't flow. Other organs are not affected; a change of its [`Perfusion`] makes it try again.
 /// Also an event on the organ, for observers.
-#[derive(Message, EntityEvent, Clone, Debug, PartialEq)]
+#[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct CirculationFailed {
     /// The organ.
     #[event_target]

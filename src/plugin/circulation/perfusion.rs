@@ -27,7 +27,8 @@ use bevy::{
 ///     Perfusion { scale: Scale::MILLIMETRES, ..Perfusion::default() },
 /// );
 /// ```
-#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(Cuttable, CirculationState, BloodLoss, OrganSupply)]
 pub struct Perfusion {

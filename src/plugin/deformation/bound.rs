@@ -6,11 +6,7 @@
 use crate::plugin::{
     circulation::flow::AT_ONCE,
     organ::mesh::MeshCopy,
-    vessels::{
-        change_log::SegmentChanges,
-        index::VesselIndex,
-        tree::{Lineage, Vessels},
-    },
+    vessels::{change_log::ChangeLog, lineage::Lineage, tree::Vessels},
 };
 use crate::synthesis::{
     binding::{Binding, BindingError},
@@ -82,9 +78,8 @@ struct MadeFor {
 pub(crate) struct Bound {
     vessels: &'static mut Vessels,
     binding: &'static mut VesselBinding,
-    changes: &'static mut SegmentChanges,
+    changes: &'static mut ChangeLog,
     aabb: Option<&'static mut Aabb>,
-    index: Option<&'static mut VesselIndex>,
 }
 
 /// How an organ has moved in a frame.
@@ -170,9 +165,6 @@ impl BoundItem<'_, '_> {
         self.changes.mark_all();
         if let Some(aabb) = &mut self.aabb {
             aabb.set_if_neq(self.vessels.aabb());
-        }
-        if let Some(index) = &mut self.index {
-            index.note_moved(&self.vessels, None);
         }
     }
 }

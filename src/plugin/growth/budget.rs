@@ -9,7 +9,7 @@ use std::time::Duration;
 /// How much all growing organs together may do in a frame. Change it at any time.
 ///
 /// Whatever it says, one step is done in each frame as long as any organ grows, so growth always comes to its end.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub enum GrowthBudget {
     /// The time for everything that growth does in a frame: starting growths, which takes half of it at most, steps, and
@@ -52,7 +52,8 @@ impl Default for GrowthBudget {
 }
 
 /// What growth did in the last frame, and how long that took.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource, Default, Clone, PartialEq)]
 pub struct GrowthFrame {
     /// Steps, over all organs.
     pub steps: u32,
@@ -142,7 +143,7 @@ pub(crate) fn begin_frame(mut frame: ResMut<GrowthFrame>) {
 
 #[cfg(test)]
 mod tests {
-    use crate::plugin::growth::grow::*;
+    use super::*;
     use std::cell::Cell;
 
     const MS: Duration = Duration::from_millis(1);

@@ -55,12 +55,7 @@ fn grow_organ_now(world: &mut World, organ: Entity) -> Result<(), RegisteredSyst
 }
 
 /// Prepares an organ here and now, and does all its steps.
-fn finish_organ(
-    In(entity): In<Entity>,
-    meshes: OrganMeshes,
-    mut organs: Query<Organ>,
-    mut messages: StartMessages,
-) {
+fn finish_organ(In(entity): In<Entity>, meshes: OrganMeshes, mut organs: Query<Organ>, mut messages: StartMessages) {
     let Ok(mut organ) = organs.get_mut(entity) else {
         warn!("{entity}: grow_now is for entities with a Vasculature");
         return;
@@ -68,7 +63,7 @@ fn finish_organ(
     organ.follow();
     organ.state.hasten();
     if organ.state.need != Need::Nothing {
-        let outcome = organ.begin(&meshes, |_, prepare| Some(prepare()));
+        let outcome = organ.begin(&meshes, None);
         organ.report(outcome, &mut messages);
     }
     run_to_end(&mut organ.state, &mut organ.progress);

@@ -2,7 +2,15 @@
 
 use crate::plugin::organ::mesh::OrganMeshError;
 use crate::synthesis::{generator::GeneratorError, tissue::TissueError};
-use bevy::ecs::{entity::Entity, event::EntityEvent, message::Message};
+use bevy::{
+    ecs::{
+        entity::Entity,
+        event::EntityEvent,
+        message::Message,
+        reflect::{ReflectEvent, ReflectMessage},
+    },
+    reflect::Reflect,
+};
 
 /// Tells an organ's growth what to do. Obeyed in the same frame or the next; unknown organs are passed over.
 ///
@@ -14,7 +22,8 @@ use bevy::ecs::{entity::Entity, event::EntityEvent, message::Message};
 /// }
 /// # bevy::ecs::system::assert_is_system(step_once);
 /// ```
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Clone, PartialEq)]
 pub struct GrowthCommand {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
     pub organ: Entity,
@@ -30,7 +39,8 @@ impl GrowthCommand {
 }
 
 /// What a growth can be told to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Clone, PartialEq)]
 pub enum GrowthAction {
     /// Do no more steps by itself.
     Pause,
@@ -46,7 +56,8 @@ pub enum GrowthAction {
 }
 
 /// An organ's growth starts from its roots, for the first time or again. Also an event on the organ, for observers.
-#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct GrowthStarted {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
     #[event_target]
@@ -67,7 +78,8 @@ pub struct GrowthStarted {
 /// }
 /// # bevy::ecs::system::assert_is_system(spawn_organ);
 /// ```
-#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct GrowthFinished {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
     #[event_target]
@@ -76,7 +88,8 @@ pub struct GrowthFinished {
 
 /// An organ's growth could not start. Other organs are not affected; a change of what was wrong starts it. Also an event
 /// on the organ, for observers.
-#[derive(Message, EntityEvent, Clone, Debug, PartialEq)]
+#[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct GrowthFailed {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
     #[event_target]
@@ -86,7 +99,8 @@ pub struct GrowthFailed {
 }
 
 /// Why an organ's vessels do not grow.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error, Reflect)]
+#[reflect(opaque, Clone, Debug, PartialEq)]
 pub enum OrganGrowthError {
     /// Its mesh is not one that vessels can grow on.
     #[error(transparent)]
@@ -94,6 +108,12 @@ pub enum OrganGrowthError {
     /// Its mesh gives no tissue of the kind that is asked for.
     #[error(transparent)]
     Tissue(#[from] TissueError),
+    /// Its preset could not be loaded.
+    #[error("the preset cannot be loaded: {reason}")]
+    Preset {
+        /// What is wrong, with the file.
+        reason: String,
+    },
     /// Its settings or roots are no start for a growth.
     #[error(transparent)]
     Generator(#[from] GeneratorError),

@@ -77,7 +77,13 @@ impl Plugin for GrowthPlugin {
             .add_message::<GrowthFailed>()
             .add_observer(publish::remove_vessels);
         diagnostics::register(app);
-        let source = (source::obey_commands, source::notice_changes, source::begin, source::receive_tissues);
+        let source = (
+            source::obey_commands,
+            source::notice_changes,
+            source::begin,
+            source::receive_tissues,
+            source::show_preparations,
+        );
         let publish = (publish::publish_vessels, grow::end_growths, diagnostics::measure);
         app.add_systems(
             self.schedule,

@@ -14,7 +14,7 @@ pub enum GrowthPhase {
     /// The organ has no mesh yet, or its mesh is still being loaded.
     #[default]
     WaitingForMesh,
-    /// The mesh is made into a tissue, beside the frames.
+    /// The mesh is made into a tissue: for large organs beside the frames, as [`JobSettings`](crate::plugin::JobSettings) say.
     PreparingTissue,
     /// Steps are done, as the [budget](crate::plugin::GrowthBudget) allows. A paused growth is in this phase, too.
     Growing,
@@ -31,6 +31,8 @@ pub enum GrowthPhase {
 pub struct GrowthProgress {
     /// What is going on.
     pub phase: GrowthPhase,
+    /// Share of the tissue's preparation that is done, from 0 to 1.
+    pub prepared: f32,
     /// Steps done.
     pub step: u32,
     /// Steps that there are.
@@ -50,6 +52,7 @@ impl GrowthProgress {
         let (count, trees) = (growth.progress(), growth.trees());
         Self {
             phase,
+            prepared: 1.0,
             step: count.done,
             steps: count.all,
             nodes: trees.map(|_, grown| grown.map_or(0, |grown| grown.tree.len())),
@@ -71,7 +74,7 @@ impl GrowthProgress {
 
 /// Whether an organ's growth goes on by itself. Set it at will, or send a
 /// [`GrowthCommand`](crate::plugin::GrowthCommand).
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub enum GrowthControl {
     /// Steps follow one another as the budget allows.

@@ -6,10 +6,10 @@ use crate::plugin::{
     growth::{budget::GrowthFrame, progress::GrowthProgress, state::GrowthState, vasculature::Vasculature},
     vessels::{
         appearance::VesselAppearance,
-        change_log::SegmentChanges,
-        index::VesselIndex,
+        change_log::ChangeLog,
+        lineage::Lineage,
         relations::{OrganVessels, VesselsOf},
-        tree::{Lineage, Vessels},
+        tree::Vessels,
     },
 };
 use crate::synthesis::{growth::GrownTree, tree::VesselKind};
@@ -34,9 +34,8 @@ use bevy::{
 #[query_data(mutable)]
 pub(crate) struct PublishedVessels {
     vessels: &'static mut Vessels,
-    changes: &'static mut SegmentChanges,
-    aabb: &'static mut Aabb,
-    index: Option<&'static mut VesselIndex>,
+    changes: &'static mut ChangeLog,
+    aabb: Option<&'static mut Aabb>,
 }
 
 /// Brings the vessel entities up to date with the growths. Spawns those that are missing.
@@ -103,11 +102,10 @@ impl PublishedVesselsItem<'_, '_> {
         let kind = self.vessels.kind();
         let (grown, changed) = state.news(kind);
         self.vessels.follow(grown, state.lineage(kind), changed, &mut self.changes);
-        if let Some(index) = &mut self.index {
-            index.note_moved(&self.vessels, changed);
-        }
         let aabb = self.vessels.aabb();
-        self.aabb.set_if_neq(aabb);
+        if let Some(known) = &mut self.aabb {
+            known.set_if_neq(aabb);
+        }
     }
 }
 
@@ -118,7 +116,7 @@ fn spawn_vessels(
     (grown, lineage): (GrownTree, Lineage),
     look: &VesselAppearance,
 ) {
-    let (mut vessels, mut changes) = (Vessels::new(kind), SegmentChanges::default());
+    let (mut vessels, mut changes) = (Vessels::new(kind), ChangeLog::default());
     vessels.follow(Some(grown), lineage, None, &mut changes);
     let visibility = look.visibility(kind);
     let name = Name::new(kind.plural());

@@ -1,8 +1,8 @@
 //! Source: from an organ's mesh and wishes to a growth that can step.
 //!
 //! Each frame: commands are obeyed, then wishes and meshes are compared with what the growth follows, then what the
-//! difference needs is done. A new tissue is prepared in the task pool, a growth on the same tissue starts at once and
-//! uses its buffers again. Where many growths start at once, the budget spreads them over frames.
+//! difference needs is done. A new tissue is prepared in a job, a growth on the same tissue starts at once and uses its
+//! buffers again. Where many growths start at once, the budget spreads them over frames.
 
 use crate::plugin::{
     announcer::Announcer,
@@ -13,6 +13,7 @@ use crate::plugin::{
         state::{GrowthState, Need, Prepared},
         vasculature::Vasculature,
     },
+    job::Jobs,
     organ::{
         mesh::{MeshCopy, OrganMeshError, copy_mesh},
         rest::RestMesh,
@@ -20,6 +21,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     mesh::TriangleMesh,
+    pace::{Pace, at_once},
     tissue::{SourceData, Tissue, TissueSource},
 };
 use bevy::{
@@ -34,7 +36,6 @@ use bevy::{
     log::warn,
     mesh::{Mesh, Mesh3d},
     platform::time::Instant,
-    tasks::{AsyncComputeTaskPool, TaskPool},
 };
 use std::{sync::Arc, time::Duration};
 
@@ -97,21 +98,18 @@ pub(crate) fn notice_changes(
     }
 }
 
-/// Begins what is needed: a tissue's preparation in the task pool, or a growth on the tissue at hand.
+/// Begins what is needed: a tissue's preparation, or a growth on the tissue at hand.
 pub(crate) fn begin(
     meshes: OrganMeshes,
     mut organs: Query<Organ>,
     mut messages: StartMessages,
     mut account: StartAccount,
+    jobs: Jobs,
 ) {
     let waiting = organs.iter().filter(|organ| organ.state.need != Need::Nothing).map(|organ| organ.entity);
     account.start_in_turn(waiting.collect(), |organ| {
         let Ok(mut organ) = organs.get_mut(organ) else { return };
-        let outcome = organ.begin(&meshes, |state, prepare| {
-            let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
-            state.await_tissue(pool.spawn(async move { prepare() }));
-            None
-        });
+        let outcome = organ.begin(&meshes, Some(&jobs));
         organ.report(outcome, &mut messages);
     });
 }
@@ -126,6 +124,15 @@ pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessa
             organ.report(outcome, &mut messages);
         }
     });
+}
+
+/// Shows how far the preparations of tissues are.
+pub(crate) fn show_preparations(mut organs: Query<(&GrowthState, &mut GrowthProgress)>) {
+    for (state, mut progress) in &mut organs {
+        if let Some(prepared) = state.preparation_progress().filter(|&prepared| prepared != progress.prepared) {
+            progress.prepared = prepared;
+        }
+    }
 }
 
 /// What starts cost, and who had a turn last.
@@ -168,10 +175,10 @@ fn mesh_news(event: &AssetEvent<Mesh>) -> Option<(AssetId<Mesh>, bool)> {
 }
 
 /// The slow part of the preparation, as a pure function of what was copied from the mesh.
-fn prepare(copy: MeshCopy, source: &TissueSource) -> Prepared {
+async fn prepare(copy: MeshCopy, source: TissueSource, pace: Pace) -> Prepared {
     let mesh = TriangleMesh::new(copy.positions, copy.triangles, None).map_err(OrganMeshError::from)?;
     let data = SourceData { mesh: Some(Arc::new(mesh)), image: None };
-    Ok(Arc::clone(source.prepare(&data)?.tissue()))
+    Ok(Arc::clone(source.prepare_paced(&data, &pace).await?.tissue()))
 }
 
 impl OrganMeshes<'_> {
@@ -195,17 +202,14 @@ impl OrganItem<'_, '_> {
     /// Takes note of changed wishes.
     pub(crate) fn follow(&mut self) {
         let mesh = self.mesh.map(|mesh| mesh.id());
+        self.state.bypass_change_detection().resume(self.progress.step);
         if self.wish.is_changed() || self.state.follows_other_mesh(mesh) {
             self.state.follow(&self.wish, mesh);
         }
     }
 
-    /// Does what is needed next. A slow preparation is handed to `run`, which may give its result at once.
-    pub(crate) fn begin(
-        &mut self,
-        meshes: &OrganMeshes,
-        run: impl FnOnce(&mut GrowthState, Box<dyn FnOnce() -> Prepared + Send>) -> Option<Prepared>,
-    ) -> Result<Started, OrganGrowthError> {
+    /// Does what is needed next. A tissue is prepared in a job; without jobs, here and now.
+    pub(crate) fn begin(&mut self, meshes: &OrganMeshes, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         match self.state.next_need() {
             Need::Nothing => Ok(false),
             Need::Growth => self.start(None),
@@ -217,10 +221,12 @@ impl OrganItem<'_, '_> {
                 };
                 self.enter(GrowthPhase::PreparingTissue);
                 let settings = self.wish.tissue.clone();
-                match run(&mut self.state, Box::new(move || prepare(copy, &settings))) {
-                    Some(prepared) => self.start(Some(prepared)),
-                    None => Ok(false),
-                }
+                let Some(jobs) = jobs else {
+                    return self.start(Some(at_once(prepare(copy, settings, Pace::default()))));
+                };
+                let work = settings.work(copy.triangles.len());
+                self.state.await_tissue(jobs.start(work, |pace| prepare(copy, settings, pace)));
+                Ok(false)
             }
         }
     }

@@ -7,20 +7,16 @@ use crate::plugin::{
         progress::GrowthControl,
         vasculature::Vasculature,
     },
+    job::Job,
     organ::mesh::OrganMeshError,
-    vessels::tree::Lineage,
+    vessels::lineage::Lineage,
 };
 use crate::synthesis::{
     growth::{GrownTree, Growth, GrowthWarning, TreeUpdate},
     tissue::Tissue,
     tree::{ByKind, VesselKind},
 };
-use bevy::{
-    asset::AssetId,
-    ecs::component::Component,
-    mesh::Mesh,
-    tasks::{Task, futures::check_ready},
-};
+use bevy::{asset::AssetId, ecs::component::Component, mesh::Mesh};
 use std::{sync::Arc, time::Duration};
 
 /// A tissue, or why there is none.
@@ -45,8 +41,8 @@ pub struct GrowthState {
     pub(crate) need: Need,
     /// The wishes and the mesh that the growth follows, or is about to.
     followed: Option<(Vasculature, Option<AssetId<Mesh>>)>,
-    /// A tissue being prepared. Letting go of the task cancels it, so that no outdated tissue ever arrives.
-    preparation: Option<Task<Prepared>>,
+    /// A tissue being prepared. To let go of the job stops it, so that no outdated tissue ever arrives.
+    preparation: Option<Job<Prepared>>,
     tissue: Option<Arc<dyn Tissue>>,
     /// Which tissue it is, or will be when it is ready.
     tissue_lineage: Lineage,
@@ -56,6 +52,8 @@ pub struct GrowthState {
     error: Option<OrganGrowthError>,
     /// Warnings that have been given for the settings.
     warned: Vec<GrowthWarning>,
+    /// Steps that the growth had done when its organ was saved, and does again at once.
+    arrears: u32,
     /// Steps that a paused growth may still do.
     granted: u32,
     /// Whether all remaining steps are to be done at once.
@@ -110,6 +108,7 @@ impl GrowthState {
                 return GrowthControl::Paused;
             }
             GrowthAction::Restart => {
+                self.arrears = 0;
                 self.granted = 0;
                 self.finish = false;
                 self.demand(Need::Growth);
@@ -123,9 +122,24 @@ impl GrowthState {
     pub(crate) fn follow(&mut self, vasculature: &Vasculature, mesh: Option<AssetId<Mesh>>) {
         let need = difference(self.followed.as_ref(), vasculature, mesh);
         if need != Need::Nothing {
+            if self.followed.as_ref().is_some_and(|(before, _)| before != vasculature) {
+                self.arrears = 0;
+            }
             self.followed = Some((vasculature.clone(), mesh));
             self.demand(need);
         }
+    }
+
+    /// Takes note of how far the growth of an organ was that comes from a scene or is a clone.
+    pub(crate) fn resume(&mut self, steps: u32) {
+        if self.followed.is_none() {
+            self.arrears = steps;
+        }
+    }
+
+    /// Whether there are steps to be done again at once.
+    pub(crate) fn is_in_arrears(&self) -> bool {
+        self.arrears > 0 && self.growth.is_some()
     }
 
     /// Whether the growth follows another mesh asset than this one.
@@ -174,21 +188,24 @@ impl GrowthState {
     }
 
     /// Waits for a tissue from now on.
-    pub(crate) fn await_tissue(&mut self, preparation: Task<Prepared>) {
+    pub(crate) fn await_tissue(&mut self, preparation: Job<Prepared>) {
         self.preparation = Some(preparation);
         self.need = Need::Nothing;
     }
 
     /// Whether a tissue has been prepared and waits to be grown on.
     pub(crate) fn is_tissue_ready(&self) -> bool {
-        self.preparation.as_ref().is_some_and(Task::is_finished)
+        self.preparation.as_ref().is_some_and(Job::is_done)
+    }
+
+    /// Share of the preparation under way that is done, if there is one.
+    pub(crate) fn preparation_progress(&self) -> Option<f32> {
+        self.preparation.as_ref().map(Job::progress)
     }
 
     /// The result of the preparation, once it is there.
     pub(crate) fn poll_preparation(&mut self) -> Option<Prepared> {
-        let result = check_ready(self.preparation.as_mut()?)?;
-        self.preparation = None;
-        Some(result)
+        Job::poll(&mut self.preparation)
     }
 
     /// Starts the growth on a new tissue, or on the one at hand, where its buffers are used again.
@@ -301,6 +318,15 @@ impl GrowthState {
     /// What the next step is expected to cost.
     pub(crate) fn expected_cost(&self) -> StepCost {
         StepCost { step: self.costs.steps.expected(), publish: self.costs.publishing.expected() }
+    }
+
+    /// Does the steps again that were done before the organ was saved.
+    pub(crate) fn catch_up(&mut self) {
+        for _ in 0..std::mem::take(&mut self.arrears) {
+            let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { break };
+            growth.advance();
+        }
+        self.settle();
     }
 
     /// Does all remaining steps.

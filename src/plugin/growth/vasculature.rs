@@ -36,7 +36,8 @@ use bevy::{
 /// # use bevy_vessels::{plugin::Vasculature, synthesis::preset::PresetName};
 /// let vasculature = Vasculature::new(PresetName::Colon).with_seed(7);
 /// ```
-#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(GrowthState, GrowthProgress, GrowthControl, VesselAppearance, Transform, Visibility)]
 pub struct Vasculature {

@@ -2,7 +2,7 @@
 
 use crate::plugin::{
     organ::mesh::{MeshCopy, vertex_positions},
-    vessels::tree::Lineage,
+    vessels::lineage::Lineage,
 };
 use bevy::{
     ecs::{component::Component, entity::Entity},

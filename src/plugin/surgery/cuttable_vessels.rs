@@ -2,7 +2,7 @@
 //!
 //! In: actions in world space, from [`CuttableVessels`] or as [`VesselCommand`] messages. Out: the ledgers in
 //! [`VesselWounds`](crate::plugin::VesselWounds), changed segments marked in
-//! [`SegmentChanges`](crate::plugin::SegmentChanges), and a [`VesselOperation`] for each vessel entity that an action
+//! [`ChangeLog`](crate::plugin::ChangeLog), and a [`VesselOperation`] for each vessel entity that an action
 //! changed.
 
 use crate::plugin::announcer::Announcer;

@@ -8,7 +8,7 @@ use crate::plugin::{
         cuttable_vessels::CuttableVessels,
         open_ends::{OpenEndEntities, despawn_children},
     },
-    vessels::{change_log::SegmentChanges, index::VesselIndex, relations::OrganVessels, tree::Vessels},
+    vessels::{change_log::ChangeLog, index::VesselIndex, relations::OrganVessels, tree::Vessels},
 };
 use crate::synthesis::wound::Retraction;
 use bevy::{
@@ -37,7 +37,8 @@ use bevy::{
 /// # use bevy_vessels::{plugin::{Cuttable, Vasculature}, synthesis::preset::PresetName};
 /// let organ = (Vasculature::new(PresetName::Colon), Cuttable::default());
 /// ```
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Cuttable {
     /// How far the ends of later cuts draw back, so that a gap is seen.
@@ -48,19 +49,32 @@ pub struct Cuttable {
 pub(crate) fn attach_wounds(
     mut commands: Commands,
     organs: Query<&OrganVessels, With<Cuttable>>,
-    bare: Query<(), (With<Vessels>, Without<VesselWounds>)>,
+    bare: Query<&VesselIndex, (With<Vessels>, Or<(Without<VesselWounds>, Without<OpenEndEntities>)>)>,
 ) {
-    for entity in organs.iter().flat_map(|vessels| vessels.entities()).filter(|&&entity| bare.contains(entity)) {
-        commands.entity(*entity).insert((VesselWounds::default(), VesselIndex::default(), OpenEndEntities::default()));
+    for &entity in organs.iter().flat_map(|vessels| vessels.entities()) {
+        let Ok(index) = bare.get(entity) else { continue };
+        index.prepare();
+        // Vessels from a scene have a ledger already.
+        commands.entity(entity).insert_if_new((VesselWounds::default(), OpenEndEntities::default()));
     }
 }
 
-/// Cut: vessels that grew anew have no wounds.
+/// Cut: vessels that grew anew have no wounds, but for those that they were saved with.
 pub(crate) fn clear_outdated(
     mut vessels: Query<(Entity, &Vessels, &mut VesselWounds)>,
     mut door: ResMut<CuttableVessels>,
 ) {
     for (entity, vessels, mut wounds) in &mut vessels {
+        if let Some(saved) = wounds.saved() {
+            if vessels.tree().is_empty() {
+                continue;
+            }
+            if vessels.is_as_saved() && saved.fits(vessels.tree()) {
+                wounds.resume(vessels);
+                continue;
+            }
+            warn!("{entity}: its wounds are dropped: these are other vessels than those that it was saved with");
+        }
         if !wounds.is_of(vessels) {
             door.bypass_change_detection().forget(entity);
             if wounds.is_empty() {
@@ -93,7 +107,7 @@ pub(crate) fn follow_settings(
 pub(crate) fn remove_wounds(
     removed: On<Remove, Cuttable>,
     organs: Query<&OrganVessels>,
-    mut vessels: Query<(&OpenEndEntities, &mut SegmentChanges)>,
+    mut vessels: Query<(&OpenEndEntities, &mut ChangeLog)>,
     mut commands: Commands,
 ) {
     let Ok(entities) = organs.get(removed.entity) else { return };
@@ -102,7 +116,7 @@ pub(crate) fn remove_wounds(
         let closed = ends.iter().map(|(_, end)| end).collect();
         commands.entity(entity).queue_silenced(|vessels: EntityWorldMut| despawn_children(vessels, closed));
         changes.mark_all();
-        commands.entity(entity).try_remove::<(VesselWounds, VesselIndex, OpenEndEntities)>();
+        commands.entity(entity).try_remove::<(VesselWounds, OpenEndEntities)>();
     }
 }
 

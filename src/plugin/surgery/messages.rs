@@ -5,8 +5,14 @@ use crate::synthesis::{
     wound::{Blade, BladeError, ClampId, WoundError, WoundReport},
 };
 use bevy::{
-    ecs::{entity::Entity, event::EntityEvent, message::Message},
+    ecs::{
+        entity::Entity,
+        event::EntityEvent,
+        message::Message,
+        reflect::{ReflectEvent, ReflectMessage},
+    },
     math::Vec3,
+    reflect::Reflect,
 };
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -22,7 +28,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// }
 /// # bevy::ecs::system::assert_is_system(clamp_here);
 /// ```
-#[derive(Message, Clone, Debug, PartialEq)]
+#[derive(Message, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Message, Clone, PartialEq)]
 pub struct VesselCommand {
     /// The organ that it is meant for; `None` for all that it meets.
     pub organ: Option<Entity>,
@@ -60,7 +67,8 @@ impl VesselCommand {
 ///
 /// What is done between two actions of a stroke, and to the same vessels, is undone together with it: a stroke that went on
 /// over it can't be taken back from under it. After an undo the stroke may go on, as one that has just begun.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
+#[reflect(Clone, PartialEq)]
 pub struct StrokeId(u64);
 
 impl StrokeId {
@@ -72,7 +80,8 @@ impl StrokeId {
 }
 
 /// What can be done to vessels. Shapes, points and lengths are in world space.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Reflect)]
+#[reflect(Clone, PartialEq)]
 pub enum VesselAction {
     /// Severs every vessel that the blade crosses; a ball or capsule also takes out what lies within it.
     Cut(Blade),
@@ -111,7 +120,8 @@ pub enum VesselAction {
 }
 
 /// Where on the vessels something is to be done.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Clone, PartialEq)]
 pub enum VesselSite {
     /// On the vessel that is nearest to a point, measured to its wall.
     Near {
@@ -130,7 +140,8 @@ pub enum VesselSite {
 }
 
 /// What kind of action it was.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
+#[reflect(Clone, PartialEq)]
 pub enum OperationKind {
     /// Vessels were severed.
     Cut,
@@ -151,7 +162,8 @@ pub enum OperationKind {
 ///
 /// Also an event on the organ, for observers. When it is told, entities for the ends that it opened are there: see
 /// [`OpenEndEntities`](crate::plugin::OpenEndEntities).
-#[derive(Message, EntityEvent, Clone, Debug, PartialEq)]
+#[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Message, Event, Clone, PartialEq)]
 pub struct VesselOperation {
     /// The organ.
     #[event_target]
@@ -169,7 +181,8 @@ pub struct VesselOperation {
 }
 
 /// An action could not be done, and changed nothing. A cut that meets no vessel is none of these.
-#[derive(Message, Clone, Debug, PartialEq)]
+#[derive(Message, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Message, Clone, PartialEq)]
 pub struct VesselOperationFailed {
     /// What was asked for.
     pub command: VesselCommand,
@@ -178,7 +191,8 @@ pub struct VesselOperationFailed {
 }
 
 /// Why an action could not be done.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error, Reflect)]
+#[reflect(opaque, Clone, Debug, PartialEq)]
 pub enum OperationError {
     /// The ledger turned it down.
     #[error(transparent)]

@@ -17,13 +17,13 @@ use bevy::{
         component::Component,
         entity::Entity,
         hierarchy::{ChildOf, Children},
-        query::{Changed, Or},
+        query::{Added, Changed, Or},
         reflect::ReflectComponent,
         system::{Commands, Query},
         world::EntityWorldMut,
     },
     math::Vec3,
-    reflect::Reflect,
+    reflect::{Reflect, std_traits::ReflectDefault},
     transform::components::Transform,
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -55,8 +55,10 @@ use std::collections::{BTreeMap, BTreeSet};
 #[require(Transform, Visibility)]
 pub struct OpenEnd {
     /// The organ.
+    #[entities]
     pub organ: Entity,
     /// The vessel entity.
+    #[entities]
     pub vessels: Entity,
     /// What kind of vessel it is an end of.
     pub kind: VesselKind,
@@ -120,7 +122,9 @@ impl OpenEnd {
 }
 
 /// The entities of the open ends of a vessel entity.
-#[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
+#[component(clone_behavior = Ignore)]
+#[reflect(Component, Default, Clone, PartialEq)]
 pub struct OpenEndEntities(BTreeMap<EndId, Entity>);
 
 impl OpenEndEntities {
@@ -132,6 +136,20 @@ impl OpenEndEntities {
     /// All ends, in the order in which they were made.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (EndId, Entity)> + '_ {
         self.0.iter().map(|(&end, &entity)| (end, entity))
+    }
+}
+
+/// Cut: open ends that came with a scene or a clone go; those of the vessels there are spawned with their wounds.
+pub(crate) fn despawn_strays(
+    mut commands: Commands,
+    new: Query<(Entity, &OpenEnd), Added<OpenEnd>>,
+    vessels: Query<&OpenEndEntities>,
+) {
+    for (entity, end) in &new {
+        let is_known = vessels.get(end.vessels).is_ok_and(|entities| entities.get(end.id) == Some(entity));
+        if !is_known {
+            commands.entity(entity).try_despawn();
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::plugin::{
         undo::UndoHistory,
     },
     vessels::{
-        change_log::SegmentChanges,
+        change_log::ChangeLog,
         index::{IndexedVessels, VesselIndex},
         pick::{Near, Touch, mean_scale, nearest_place},
         relations::OrganVessels,
@@ -37,8 +37,8 @@ use bevy::{
 pub(crate) struct Operated {
     vessels: &'static Vessels,
     wounds: &'static mut VesselWounds,
-    index: &'static mut VesselIndex,
-    changes: &'static mut SegmentChanges,
+    index: &'static VesselIndex,
+    changes: &'static mut ChangeLog,
 }
 
 /// All that an action may meet.
@@ -139,12 +139,12 @@ impl OperatingField<'_, '_> {
         &mut self,
         target: Target,
         operation: OperationKind,
-        operate: impl FnOnce(&mut Wounds, &Vessels, &VesselIndex) -> Report,
+        operate: impl FnOnce(&mut Wounds, &IndexedVessels) -> Report,
     ) -> Result<Option<VesselOperation>, OperationError> {
         let Target { organ, vessels: entity } = target;
         let mut found = self.vessels.get_mut(entity).map_err(|_| OperationError::NoVessels { vessels: entity })?;
-        found.index.refresh(found.vessels);
-        let report = operate(found.wounds.bypass_change_detection().ledger_mut(), found.vessels, &found.index)?;
+        let indexed = found.index.search(found.vessels, &found.changes);
+        let report = operate(found.wounds.bypass_change_detection().ledger_mut(), &indexed)?;
         if report.is_empty() {
             return Ok(None);
         }
@@ -154,16 +154,15 @@ impl OperatingField<'_, '_> {
     }
 
     fn cut(&mut self, targets: &[Target], blade: &Blade) -> Outcome {
-        self.sweep(targets, blade, OperationKind::Cut, |wounds, vessels, index, blade, _| {
-            Ok(wounds.cut(blade, vessels.tree(), IndexedVessels { vessels, index }))
+        self.sweep(targets, blade, OperationKind::Cut, |wounds, indexed, blade, _| {
+            Ok(wounds.cut(blade, indexed.tree(), indexed))
         })
     }
 
     fn cauterise(&mut self, targets: &[Target], volume: &Blade, max_calibre: f32) -> Outcome {
-        self.sweep(targets, volume, OperationKind::Cauterised, |wounds, vessels, index, volume, scale| {
-            let tree = vessels.tree();
-            let candidates = |region: &Region, visit: &mut dyn FnMut(_)| index.candidates(tree, region, visit);
-            Ok(wounds.cauterise(volume, max_calibre / scale, tree, candidates)?)
+        self.sweep(targets, volume, OperationKind::Cauterised, |wounds, indexed, volume, scale| {
+            let candidates = |region: &Region, visit: &mut dyn FnMut(_)| indexed.candidates(region, visit);
+            Ok(wounds.cauterise(volume, max_calibre / scale, indexed.tree(), candidates)?)
         })
     }
 
@@ -174,7 +173,7 @@ impl OperatingField<'_, '_> {
         targets: &[Target],
         blade: &Blade,
         kind: OperationKind,
-        operation: impl Fn(&mut Wounds, &Vessels, &VesselIndex, &Blade, f32) -> Report,
+        operation: impl Fn(&mut Wounds, &IndexedVessels, &Blade, f32) -> Report,
     ) -> Outcome {
         let mut outcome = Outcome::default();
         for &target in targets {
@@ -183,7 +182,7 @@ impl OperatingField<'_, '_> {
             let local = local.map_err(|error| OperationError::Blade { organ: target.organ, error });
             let done = local.and_then(|local| {
                 let scale = mean_scale(&to_world);
-                self.operate(target, kind, |wounds, vessels, index| operation(wounds, vessels, index, &local, scale))
+                self.operate(target, kind, |wounds, indexed| operation(wounds, indexed, &local, scale))
             });
             match done {
                 Ok(done) => outcome.done.extend(done),
@@ -210,7 +209,7 @@ impl OperatingField<'_, '_> {
         kind: OperationKind,
         close: impl FnOnce(&mut Wounds, &Vessels) -> Result<WoundReport, WoundError>,
     ) -> Operations {
-        let done = self.operate(target, kind, |wounds, vessels, _| Ok(close(wounds, vessels)?))?;
+        let done = self.operate(target, kind, |wounds, indexed| Ok(close(wounds, indexed.vessels)?))?;
         Ok(done.into_iter().collect())
     }
 
@@ -218,7 +217,7 @@ impl OperatingField<'_, '_> {
         self.close(target, OperationKind::Unclamped, |wounds, vessels| wounds.unclamp(clamp, vessels.tree()))
     }
 
-    fn site(&mut self, targets: &[Target], site: VesselSite) -> Result<(Target, Place), OperationError> {
+    fn site(&self, targets: &[Target], site: VesselSite) -> Result<(Target, Place), OperationError> {
         match site {
             VesselSite::At { vessels, place } => Ok((target_of(targets, vessels)?, place)),
             VesselSite::Near { point, reach } => {
@@ -228,15 +227,15 @@ impl OperatingField<'_, '_> {
         }
     }
 
-    fn nearest(&mut self, targets: &[Target], point: Vec3, reach: f32) -> Option<(Target, Place)> {
+    fn nearest(&self, targets: &[Target], point: Vec3, reach: f32) -> Option<(Target, Place)> {
         let mut best: Option<(Target, Near)> = None;
         for &target in targets {
             let Some(to_world) = self.to_world(target) else { continue };
-            let Ok(mut found) = self.vessels.get_mut(target.vessels) else { continue };
-            found.index.refresh(found.vessels);
+            let Ok(found) = self.vessels.get(target.vessels) else { continue };
             let reach = best.map_or(reach, |(_, near)| near.distance);
             let touch = Touch { point, reach, to_world };
-            let near = nearest_place(&touch, found.vessels, &found.wounds, &found.index);
+            let indexed = found.index.search(found.vessels, found.changes);
+            let near = nearest_place(&touch, &indexed, Some(found.wounds));
             if let Some(near) = near.filter(|near| best.is_none_or(|(_, best)| near.distance < best.distance)) {
                 best = Some((target, near));
             }
@@ -271,9 +270,8 @@ impl OperatingField<'_, '_> {
                 let Some(&(_, actions)) = changed.iter().find(|(vessels, _)| *vessels == target.vessels) else {
                     continue;
                 };
-                let undo = |wounds: &mut Wounds, vessels: &Vessels, _: &VesselIndex| {
-                    Ok(wounds.undo_last(actions, vessels.tree()))
-                };
+                let undo =
+                    |wounds: &mut Wounds, indexed: &IndexedVessels| Ok(wounds.undo_last(actions, indexed.tree()));
                 done.extend(self.operate(*target, OperationKind::Undone, undo).ok().flatten());
             }
             // What a regrowth has cleared is nothing to undo: the one before it is meant.
@@ -286,7 +284,7 @@ impl OperatingField<'_, '_> {
 
     fn undo_all(&mut self, targets: &[Target], history: &mut UndoHistory) -> Vec<VesselOperation> {
         history.forget(|vessels| targets.iter().any(|target| target.vessels == vessels));
-        let undo = |wounds: &mut Wounds, vessels: &Vessels, _: &VesselIndex| Ok(wounds.undo_all(vessels.tree()));
+        let undo = |wounds: &mut Wounds, indexed: &IndexedVessels| Ok(wounds.undo_all(indexed.tree()));
         targets.iter().filter_map(|&target| self.operate(target, OperationKind::Undone, undo).ok().flatten()).collect()
     }
 }

@@ -15,7 +15,7 @@ use bevy::{
 };
 
 /// What the colour of a segment tells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum SegmentColoring {
     /// What kind of vessel it is.
@@ -33,7 +33,8 @@ pub enum SegmentColoring {
 }
 
 /// How an organ's vessels look.
-#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct VesselAppearance {
     /// Colour of each kind of vessels.

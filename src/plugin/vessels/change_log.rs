@@ -1,205 +1,300 @@
-//! Which segments of a vessel tree changed since someone last looked.
+//! What changed in the vessels of an entity, for any number of readers, each at its own pace.
+//!
+//! In: nodes that a writer marks. Out: for each reader, the segments that changed since it last looked. A writer doesn't
+//! know its readers: each node has a stamp, the revision of its last change, and a reader remembers a revision.
 
+use crate::plugin::vessels::{changes::Changes, lineage::Lineage};
 use bevy::ecs::component::Component;
-use std::ops::Range;
 
-/// Segments that changed since the last [`clear`](Self::clear), for those who keep a copy of them, such as a buffer on
-/// the graphics card.
+/// When each segment of a vessel entity last changed.
 ///
-/// A segment has changed when either of its ends moved or changed its radius. While an organ grows, those are a tenth of
-/// all segments in a step, scattered over the whole tree along the paths from the new tips to the roots: so each segment
-/// has a bit of its own, and whole chunks would nearly all be marked.
+/// A segment has changed when either of its ends moved or changed its radius, or when something was done to it: cut,
+/// clamped, sealed or healed. While an organ grows, those are a tenth of all segments in a step, scattered over the whole
+/// tree along the paths from the new tips to the roots; so each segment has a stamp of its own.
 ///
-/// On a vessel entity, whoever draws the segments clears this after reading. There, a tree may also have become shorter:
-/// segments from [`VesselTree::len`](crate::synthesis::tree::VesselTree::len) on are gone.
-#[derive(Component, Clone, Debug, Default, PartialEq, Eq)]
-pub struct SegmentChanges {
-    /// One bit per node.
-    nodes: Vec<u64>,
-    /// Whether any bit is set.
-    any: bool,
-    /// Whether every segment counts as changed, however many there are.
-    all: bool,
+/// Whoever keeps something that follows from segments, such as a buffer on the graphics card, a file or a texture, reads
+/// with a [`ChangeCursor`] of its own, as often as it likes. Reading changes nothing for other readers.
+///
+/// The plugin marks what it changes, and marks everything where [`Vessels`](crate::plugin::Vessels) take the place of
+/// others. Whoever changes vessels by hand has [`Vessels::update_from_tree`](crate::plugin::Vessels::update_from_tree)
+/// mark what became different.
+///
+/// Memory: 4 bytes a node, once nodes are marked one by one.
+///
+/// ```
+/// # use bevy_vessels::plugin::{ChangeCursor, ChangeLog, Vessels};
+/// # use bevy::prelude::{Entity, Local, Query};
+/// # use std::collections::BTreeMap;
+/// /// Once a second, say: how many segments changed since the last time.
+/// fn count(vessels: Query<(Entity, &Vessels, &ChangeLog)>, mut cursors: Local<BTreeMap<Entity, ChangeCursor>>) {
+///     for (entity, vessels, log) in &vessels {
+///         let changes = cursors.entry(entity).or_default().read(log);
+///         println!("{} segments changed", changes.count(vessels.tree().len()));
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(count);
+/// ```
+#[derive(Component, Debug)]
+pub struct ChangeLog {
+    /// Tells this log, and its count of revisions, from others.
+    id: Lineage,
+    /// The tree that it is about.
+    tree: Lineage,
+    /// Revision of the last change.
+    revision: u32,
+    /// Revision at which everything changed; 0 for never.
+    all: u32,
+    /// Revision of each node's last change, 0 for none.
+    stamps: Vec<[u32; 64]>,
+    /// Largest of each 64 stamps.
+    latest: Vec<u32>,
 }
 
-impl SegmentChanges {
-    /// Marks the segment that ends in a node.
-    pub fn mark_node(&mut self, node: usize) {
-        let word = node / 64;
-        if word >= self.nodes.len() {
-            self.nodes.resize(word + 1, 0);
-        }
-        self.nodes[word] |= 1 << (node % 64);
-        self.any = true;
-    }
+/// How far a reader of a [`ChangeLog`] has read. The default has seen nothing, so that everything counts as changed.
+///
+/// It belongs to the log that it last read. To any other, such as that of an entity that took the first one's place, it is
+/// as one that has seen nothing.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ChangeCursor {
+    log: Lineage,
+    revision: u32,
+}
 
-    /// Marks every segment that there is, and those that will come until the next [`clear`](Self::clear).
-    pub fn mark_all(&mut self) {
-        self.all = true;
-    }
-
-    /// Whether nothing changed.
-    pub fn is_empty(&self) -> bool {
-        !self.all && !self.any
-    }
-
-    /// Whether every segment counts as changed.
-    pub fn is_all(&self) -> bool {
-        self.all
-    }
-
-    /// Forgets all changes and keeps the memory.
-    pub fn clear(&mut self) {
-        if self.any {
-            self.nodes.fill(0);
-        }
-        (self.any, self.all) = (false, false);
-    }
-
-    /// Whether the segment that ends in a node counts as changed.
-    pub fn contains(&self, node: usize) -> bool {
-        self.word(node / 64) >> (node % 64) & 1 == 1
-    }
-
-    /// Number of changed nodes of a tree of `len` nodes.
-    pub fn count(&self, len: usize) -> usize {
-        if self.all {
-            return len;
-        }
-        let whole = len / 64;
-        let words = self.nodes.iter().take(whole).map(|word| word.count_ones() as usize);
-        words.sum::<usize>() + self.dirty_nodes(whole * 64..len).count()
-    }
-
-    /// The changed nodes of a range, in rising order: faster than [`dirty_ranges`](Self::dirty_ranges) where they are
-    /// scattered.
-    pub fn dirty_nodes(&self, nodes: Range<usize>) -> impl Iterator<Item = usize> + '_ {
-        let words = nodes.start / 64..nodes.end.div_ceil(64);
-        words.flat_map(move |word| {
-            let mut bits = self.word(word);
-            if word == nodes.start / 64 {
-                bits &= u64::MAX << (nodes.start % 64);
-            }
-            if word == nodes.end / 64 {
-                bits &= (1 << (nodes.end % 64)) - 1;
-            }
-            std::iter::from_fn(move || {
-                let node = (bits != 0).then(|| word * 64 + bits.trailing_zeros() as usize)?;
-                bits &= bits - 1;
-                Some(node)
-            })
-        })
-    }
-
-    /// The bits of 64 nodes.
-    fn word(&self, word: usize) -> u64 {
-        if self.all { u64::MAX } else { self.nodes.get(word).copied().unwrap_or(0) }
-    }
-
-    /// Ranges of changed nodes of a tree of `len` nodes: neighbours joined, in rising order.
+impl ChangeCursor {
+    /// What changed since this cursor last read, and moves the cursor to the present.
     ///
-    /// The cost is that of a glance at 64 nodes at a time, and of the ranges.
-    pub fn dirty_ranges(&self, len: usize) -> impl Iterator<Item = Range<usize>> + '_ {
-        let mut node = 0;
-        std::iter::from_fn(move || {
-            let first = self.next(node, len, true)?;
-            node = self.next(first, len, false).unwrap_or(len);
-            Some(first..node)
-        })
+    /// The cost is that of a glance at 64 nodes at a time, and of a comparison for each node of those words in which
+    /// something changed.
+    #[must_use = "the cursor has moved on: what changed is told once"]
+    pub fn read(&mut self, log: &ChangeLog) -> Changes {
+        let seen = std::mem::replace(self, log.now());
+        log.since(&seen)
     }
 
-    /// The first node from `from` on, below `len`, that has changed or has not.
-    fn next(&self, from: usize, len: usize, changed: bool) -> Option<usize> {
-        if self.all {
-            return (changed && from < len).then_some(from);
-        }
-        let mut word = from / 64;
-        let mut mask = u64::MAX << (from % 64);
-        while word * 64 < len {
-            let bits = self.nodes.get(word).copied().unwrap_or(0);
-            let wanted = mask & if changed { bits } else { !bits };
-            if wanted != 0 {
-                let node = word * 64 + wanted.trailing_zeros() as usize;
-                return (node < len).then_some(node);
-            }
-            if changed && word >= self.nodes.len() {
-                return None;
-            }
-            (word, mask) = (word + 1, u64::MAX);
-        }
-        None
+    /// Whether there is nothing to read. Costs nothing.
+    pub fn is_current(&self, log: &ChangeLog) -> bool {
+        *self == log.now()
     }
+}
+
+impl ChangeLog {
+    /// Marks the segments that end in some nodes, as one change.
+    pub fn mark(&mut self, nodes: impl IntoIterator<Item = usize>) {
+        let mut nodes = nodes.into_iter().peekable();
+        if nodes.peek().is_none() {
+            return;
+        }
+        self.begin_revision();
+        for node in nodes {
+            let (word, place) = (node / 64, node % 64);
+            if word >= self.latest.len() {
+                self.stamps.resize(word + 1, [0; 64]);
+                self.latest.resize(word + 1, 0);
+            }
+            self.stamps[word][place] = self.revision;
+            self.latest[word] = self.revision;
+        }
+    }
+
+    /// Marks every segment that there is, however many that are.
+    pub fn mark_all(&mut self) {
+        self.begin_revision();
+        self.all = self.revision;
+    }
+
+    /// A cursor that has seen all changes so far.
+    pub fn now(&self) -> ChangeCursor {
+        ChangeCursor { log: self.id, revision: self.revision }
+    }
+
+    /// Whether the log is about this tree.
+    pub(crate) fn is_of(&self, tree: Lineage) -> bool {
+        self.tree == tree
+    }
+
+    /// Begins with another tree, of which everything is new.
+    pub(crate) fn begin_tree(&mut self, tree: Lineage) {
+        self.tree = tree;
+        self.mark_all();
+    }
+
+    /// Counts up. After the last revision the log begins anew as another one, so that no reader misses anything.
+    fn begin_revision(&mut self) {
+        self.revision = self.revision.checked_add(1).unwrap_or_else(|| {
+            *self = Self { tree: self.tree, ..Self::default() };
+            1
+        });
+    }
+
+    fn since(&self, seen: &ChangeCursor) -> Changes {
+        if seen.log != self.id || seen.revision < self.all {
+            return Changes::ALL;
+        }
+        let changed = |latest: &u32| *latest > seen.revision;
+        let end = self.latest.iter().rposition(changed).map_or(0, |last| last + 1);
+        let words = self.latest[..end].iter().zip(&self.stamps);
+        let words = words.map(|(latest, stamps)| if changed(latest) { newer(stamps, seen.revision) } else { 0 });
+        Changes::of_words(words.collect())
+    }
+}
+
+impl Default for ChangeLog {
+    fn default() -> Self {
+        Self {
+            id: Lineage::new_one(),
+            tree: Lineage::default(),
+            revision: 0,
+            all: 0,
+            stamps: Vec::new(),
+            latest: Vec::new(),
+        }
+    }
+}
+
+/// A bit for each stamp above a revision. Without branches, so that the comparisons are done many at a time.
+fn newer(stamps: &[u32; 64], revision: u32) -> u64 {
+    /// Moves the lowest bit of each byte, the first byte's first, into the highest byte.
+    const GATHER: u64 = 0x0102_0408_1020_4080;
+    let flags = stamps.map(|stamp| u8::from(stamp > revision));
+    let (eights, _) = flags.as_chunks::<8>();
+    let bits = eights.iter().enumerate().map(|(eight, flags)| {
+        let bits = u64::from_le_bytes(*flags).wrapping_mul(GATHER) >> 56;
+        bits << (8 * eight)
+    });
+    bits.fold(0, |all, bits| all | bits)
 }
 
 #[cfg(test)]
 mod tests {
     use crate::plugin::vessels::change_log::*;
+    use crate::synthesis::random::Stream;
+    use rand::RngExt;
+    use std::collections::BTreeSet;
 
-    fn ranges(changes: &SegmentChanges, len: usize) -> Vec<Range<usize>> {
-        changes.dirty_ranges(len).collect()
+    const NODES: usize = 1000;
+
+    /// A reader, and what a slow twin of the log says that it has not seen yet.
+    #[derive(Default)]
+    struct Reader {
+        cursor: ChangeCursor,
+        unseen: BTreeSet<usize>,
+        period: usize,
     }
 
-    #[test]
-    fn neighbours_join_over_words_and_the_last_is_cut_to_length() {
-        let mut changes = SegmentChanges::default();
-        for node in [3, 62, 63, 64, 65, 128, 300] {
-            changes.mark_node(node);
+    impl Reader {
+        fn check(&mut self, log: &ChangeLog, what: &str) {
+            let unseen: Vec<usize> = std::mem::take(&mut self.unseen).into_iter().collect();
+            let was_current = self.cursor.is_current(log);
+            let changes = self.cursor.read(log);
+            assert_eq!(changes.dirty_nodes(0..NODES).collect::<Vec<_>>(), unseen, "{what}");
+            assert_eq!(changes.count(NODES), unseen.len(), "{what}");
+            assert_eq!(changes.is_empty(), unseen.is_empty(), "{what}");
+            assert_eq!(was_current, unseen.is_empty(), "{what}");
+            assert!(self.cursor.is_current(log), "{what}");
         }
-        assert_eq!(ranges(&changes, 301), [3..4, 62..66, 128..129, 300..301]);
-        assert_eq!(ranges(&changes, 64), [3..4, 62..64]);
-        assert_eq!(ranges(&changes, 100_000), ranges(&changes, 301));
-        assert!(ranges(&changes, 0).is_empty());
     }
 
-    #[test]
-    fn whole_words_make_one_range() {
-        let mut changes = SegmentChanges::default();
-        (64..64 * 9).for_each(|node| changes.mark_node(node));
-        assert_eq!(ranges(&changes, 10_000), [64..64 * 9]);
-        assert_eq!(ranges(&changes, 200), [64..200]);
-    }
-
-    #[test]
-    fn marking_all_covers_every_length_until_cleared() {
-        let mut changes = SegmentChanges::default();
-        assert!(changes.is_empty());
-        changes.mark_all();
-        assert_eq!(ranges(&changes, 1000), [0..1000]);
-        assert!(!changes.is_empty() && changes.is_all());
-        changes.clear();
-        assert!(changes.is_empty());
-        assert!(ranges(&changes, 1000).is_empty());
-    }
-
-    #[test]
-    fn nodes_are_those_of_the_ranges_in_any_part() {
-        let mut some = SegmentChanges::default();
-        (0..900).filter(|node| node * node % 7 == 1 || (128..256).contains(node)).for_each(|node| some.mark_node(node));
-        let mut all = some.clone();
-        all.mark_all();
-        for changes in [SegmentChanges::default(), some, all] {
-            for part in [0..0, 0..1, 0..64, 5..900, 64..128, 63..65, 130..131, 700..4000] {
-                let expected: Vec<usize> =
-                    changes.dirty_ranges(part.end).flatten().filter(|&node| node >= part.start).collect();
-                assert_eq!(changes.dirty_nodes(part.clone()).collect::<Vec<_>>(), expected, "{part:?}");
-                assert!(part.clone().all(|node| changes.contains(node) == expected.contains(&node)), "{part:?}");
-                assert_eq!(changes.count(part.end), changes.dirty_nodes(0..part.end).count(), "{part:?}");
+    /// Random marks, with readers that look every frame, every few, and hardly ever.
+    fn read_at_different_rates(mut log: ChangeLog, seed: u64) {
+        let mut rng = Stream::Statistics.rng(seed);
+        let new = |period| Reader { period, unseen: (0..NODES).collect(), ..Reader::default() };
+        let mut readers = [1, 3, 7, 50].map(new);
+        for frame in 1..=400 {
+            for _ in 0..rng.random_range(0..4) {
+                let marked: Vec<usize> = match rng.random_range(0..40) {
+                    0 => {
+                        log.mark_all();
+                        (0..NODES).collect()
+                    }
+                    kind => {
+                        let most = if kind < 30 { 6 } else { NODES };
+                        (0..rng.random_range(0..most)).map(|_| rng.random_range(0..NODES)).collect()
+                    }
+                };
+                if marked.len() < NODES {
+                    log.mark(marked.iter().copied());
+                }
+                readers.iter_mut().for_each(|reader| reader.unseen.extend(&marked));
+            }
+            for reader in readers.iter_mut().filter(|reader| frame % reader.period == 0) {
+                reader.check(&log, &format!("seed {seed}, frame {frame}, every {}", reader.period));
             }
         }
     }
 
     #[test]
-    fn ranges_hold_the_marked_nodes_and_no_other() {
-        let mut changes = SegmentChanges::default();
-        let marked: Vec<usize> = (0..400).map(|i| i * i * 37 % 20_000).collect();
-        marked.iter().for_each(|&node| changes.mark_node(node));
-        let found = ranges(&changes, 20_000);
-        assert!(found.windows(2).all(|pair| pair[0].end < pair[1].start), "neighbours are joined, in rising order");
-        let mut expected = marked.clone();
-        expected.sort_unstable();
-        expected.dedup();
-        assert_eq!(found.into_iter().flatten().collect::<Vec<_>>(), expected);
-        changes.clear();
-        assert!(ranges(&changes, 20_000).is_empty());
+    fn each_reader_sees_what_it_has_not_seen_at_any_rate() {
+        (0..20).for_each(|seed| read_at_different_rates(ChangeLog::default(), seed));
+    }
+
+    #[test]
+    fn a_new_reader_sees_everything_and_then_only_what_changes() {
+        let mut log = ChangeLog::default();
+        let mut cursor = ChangeCursor::default();
+        assert!(!cursor.is_current(&log));
+        assert!(cursor.read(&log).is_all());
+        assert!(cursor.is_current(&log) && cursor.read(&log).is_empty());
+        log.mark([]);
+        assert!(cursor.is_current(&log), "no nodes are no change");
+        log.mark([700, 3, 3]);
+        assert!(!cursor.is_current(&log));
+        assert_eq!(cursor.read(&log).dirty_ranges(NODES).collect::<Vec<_>>(), [3..4, 700..701]);
+        log.mark_all();
+        log.mark([5]);
+        assert!(cursor.read(&log).is_all());
+        assert!(cursor.read(&log).is_empty());
+    }
+
+    #[test]
+    fn a_cursor_of_another_log_has_seen_nothing() {
+        let [mut one, mut other] = [(); 2].map(|()| ChangeLog::default());
+        one.mark([1]);
+        other.mark([2]);
+        let mut cursor = one.now();
+        assert!(cursor.read(&one).is_empty());
+        assert!(cursor.read(&other).is_all(), "whatever its revision");
+        assert!(cursor.read(&other).is_empty());
+        assert!(cursor.read(&one).is_all(), "and back");
+    }
+
+    #[test]
+    fn another_tree_is_changed_throughout() {
+        let mut log = ChangeLog::default();
+        let tree = Lineage::new_one();
+        log.begin_tree(tree);
+        let mut cursor = log.now();
+        assert!(log.is_of(tree) && cursor.read(&log).is_empty());
+        log.begin_tree(Lineage::new_one());
+        assert!(!log.is_of(tree) && cursor.read(&log).is_all());
+    }
+
+    #[test]
+    fn no_reader_misses_anything_when_revisions_run_out() {
+        let mut log = ChangeLog { revision: u32::MAX - 1, ..ChangeLog::default() };
+        let (mut current, stale) = (log.now(), ChangeCursor { log: log.id, revision: 7 });
+        log.mark([1]);
+        assert_eq!(current.read(&log).dirty_nodes(0..NODES).collect::<Vec<_>>(), [1]);
+        log.mark([2]);
+        for mut cursor in [current, stale, ChangeCursor::default()] {
+            assert!(cursor.read(&log).is_all());
+            log.mark([3]);
+            assert_eq!(cursor.read(&log).dirty_nodes(0..NODES).collect::<Vec<_>>(), [3], "and goes on");
+        }
+    }
+
+    #[test]
+    fn stamps_compare_as_one_by_one() {
+        let mut rng = Stream::Statistics.rng(1);
+        for revision in [0, 1, 5, u32::MAX / 2, u32::MAX - 1, u32::MAX] {
+            for _ in 0..200 {
+                let stamps: [u32; 64] = std::array::from_fn(|_| match rng.random_range(0..3) {
+                    0 => rng.random(),
+                    1 => revision.wrapping_add(rng.random_range(0..3)).wrapping_sub(1),
+                    _ => 0,
+                });
+                let bit = |place: usize| u64::from(stamps[place] > revision) << place;
+                assert_eq!(newer(&stamps, revision), (0..64).map(bit).sum::<u64>(), "{stamps:?} above {revision}");
+            }
+        }
     }
 }

@@ -1,53 +1,56 @@
 //! Which segments of a vessel entity an instrument may meet, at any moment of a growth and without holding up a frame.
 //!
-//! In: [`Vessels`], and which of them moved. Out: candidates for a cut or a touch. Small trees are indexed when they are
-//! first asked about. Large ones are indexed in the task pool; what the index doesn't hold yet is searched one by one,
-//! so that an answer is complete at any time.
+//! In: [`Vessels`] and their [`ChangeLog`]. Out: candidates for a cut or a touch, and what a ray meets first. Small trees
+//! are indexed when they are first asked about. Large ones are indexed in the task pool from then on; what the index
+//! doesn't hold yet is searched one by one, so that an answer is complete at any time, and the same.
 
-use crate::plugin::vessels::tree::{Lineage, Vessels};
+use crate::plugin::vessels::{
+    change_log::{ChangeCursor, ChangeLog},
+    lineage::Lineage,
+    tree::Vessels,
+};
 use crate::synthesis::{
-    segment_index::{Region, SegmentIndex, SegmentSearch},
+    segment_index::{RayCast, Region, SegmentIndex, SegmentSearch},
     tree::{NO_PARENT, NodeId, VesselTree},
 };
 use bevy::{
-    ecs::{change_detection::DetectChanges, component::Component, system::Query, world::Ref},
+    ecs::{change_detection::DetectChangesMut, component::Component, system::Query},
     tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
 };
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-/// An index over the segments of a vessel entity. The plugin adds it to the vessels of a
-/// [`Cuttable`](crate::plugin::Cuttable) organ and keeps it up to date.
+/// An index over the segments of a vessel entity. Every vessel entity has one, which is empty and costs nothing until
+/// someone asks.
+///
+/// [`VesselPicker`](crate::plugin::VesselPicker) and [`CuttableVessels`](crate::plugin::CuttableVessels) ask it. Questions
+/// take it as it is, without `&mut`: it follows the vessels when it is asked.
 #[derive(Component, Debug, Default)]
 pub struct VesselIndex {
+    /// Written by questions that find it outdated, and read by the others.
+    state: RwLock<IndexState>,
+}
+
+#[derive(Debug, Default)]
+struct IndexState {
     index: SegmentIndex,
-    lineage: Lineage,
-    /// What moved since the index was measured.
-    moved: Moved,
-    task: Option<Task<SegmentIndex>>,
-    /// What moved since the tree was copied for the task.
-    moved_meanwhile: Moved,
+    /// The changes that the index has followed.
+    cursor: ChangeCursor,
+    /// The tree that is indexed.
+    tree: Lineage,
+    /// Whether anyone has ever asked.
+    is_wanted: bool,
+    coming: Option<ComingIndex>,
+    /// Nodes of the tree in the last frame, and for how many frames there were so many.
+    len: usize,
     idle_frames: u32,
 }
 
-/// Nodes that moved or changed their radius.
-#[derive(Debug, Default)]
-enum Moved {
-    #[default]
-    None,
-    Nodes(Vec<u32>),
-    All,
-}
-
-impl Moved {
-    fn add(&mut self, nodes: impl IntoIterator<Item = u32>, most: usize) {
-        match self {
-            Self::None => *self = Self::Nodes(nodes.into_iter().collect()),
-            Self::Nodes(moved) => moved.extend(nodes),
-            Self::All => {}
-        }
-        if matches!(self, Self::Nodes(moved) if moved.len() > most) {
-            *self = Self::All;
-        }
-    }
+/// An index that is made beside the frames.
+#[derive(Debug)]
+struct ComingIndex {
+    task: Task<SegmentIndex>,
+    /// The changes that it has followed: those until the tree was copied.
+    cursor: ChangeCursor,
 }
 
 impl VesselIndex {
@@ -58,46 +61,115 @@ impl VesselIndex {
 
     /// Nodes that the index holds; the others are searched one by one.
     pub fn indexed(&self) -> usize {
-        self.index.len()
+        self.read().index.len()
     }
 
     /// Whether every node of the vessels is indexed.
     pub fn is_complete(&self, vessels: &Vessels) -> bool {
-        self.lineage == vessels.lineage() && self.index.len() == vessels.tree().len()
+        let state = self.read();
+        state.tree == vessels.lineage() && state.index.len() == vessels.tree().len()
     }
 
-    /// Takes note of nodes that moved, with their children; `None` for all.
-    pub(crate) fn note_moved(&mut self, vessels: &Vessels, nodes: Option<&[u32]>) {
-        let most = vessels.tree().len() / 8;
-        for moved in [&mut self.moved, &mut self.moved_meanwhile] {
-            match nodes {
-                None => *moved = Moved::All,
-                Some(nodes) => {
-                    let children = |&node: &u32| vessels.children(node as usize).map(|child| child as u32);
-                    moved.add(nodes.iter().copied().chain(nodes.iter().flat_map(children)), most);
-                }
-            }
+    /// Has large vessels indexed before the first question, so that this is quick, too. The plugin does so for
+    /// [`Cuttable`](crate::plugin::Cuttable) organs.
+    pub fn prepare(&self) {
+        self.write().is_wanted = true;
+    }
+
+    /// The index, right for the vessels as they are, for any number of questions. The log is that of the same entity.
+    pub(crate) fn search<'a>(&'a self, vessels: &'a Vessels, log: &ChangeLog) -> IndexedVessels<'a> {
+        let state = self.read();
+        if state.is_wanted && state.follows(vessels, log) {
+            return IndexedVessels { vessels, state };
+        }
+        drop(state);
+        let mut state = self.write();
+        state.is_wanted = true;
+        state.follow(vessels, log);
+        IndexedVessels { vessels, state: RwLockWriteGuard::downgrade(state) }
+    }
+
+    /// A question that panicked leaves an index that is outdated at worst, which the next one sees.
+    fn read(&self) -> RwLockReadGuard<'_, IndexState> {
+        self.state.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn write(&self) -> RwLockWriteGuard<'_, IndexState> {
+        self.state.write().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl IndexState {
+    /// Whether the index is that of the vessels as they are, as far as it goes.
+    fn follows(&self, vessels: &Vessels, log: &ChangeLog) -> bool {
+        let len = vessels.tree().len();
+        let is_long_enough = self.index.len() == len || len > VesselIndex::AT_ONCE;
+        self.tree == vessels.lineage() && self.index.len() <= len && is_long_enough && self.cursor.is_current(log)
+    }
+
+    /// Measures what changed, and indexes the new nodes of a small tree.
+    fn follow(&mut self, vessels: &Vessels, log: &ChangeLog) {
+        self.forget_others(vessels);
+        let (tree, known) = (vessels.tree(), self.index.len());
+        if tree.len() <= VesselIndex::AT_ONCE {
+            self.index.extend(tree);
+        }
+        let changes = self.cursor.read(log);
+        if changes.count(known) > known / 8 {
+            self.index.refit(tree);
+        } else {
+            self.index.refit_nodes(tree, changes.dirty_nodes(0..known).map(|node| NodeId(node as u32)));
         }
     }
 
-    /// Makes the index right for the vessels as they are: to be called before questions.
-    pub(crate) fn refresh(&mut self, vessels: &Vessels) {
-        self.follow(vessels);
-        if vessels.tree().len() <= Self::AT_ONCE {
-            self.index.extend(vessels.tree());
-        }
-        match std::mem::take(&mut self.moved) {
-            Moved::None => {}
-            Moved::Nodes(nodes) => self.index.refit_nodes(vessels.tree(), nodes.into_iter().map(NodeId)),
-            Moved::All => self.index.refit(vessels.tree()),
+    /// Forgets another tree's segments.
+    fn forget_others(&mut self, vessels: &Vessels) {
+        if self.tree != vessels.lineage() || self.index.len() > vessels.tree().len() {
+            *self = Self { tree: vessels.lineage(), is_wanted: self.is_wanted, ..Self::default() };
         }
     }
 
-    /// Visits at least the segments that meet a region, each by its end node. Call [`refresh`](Self::refresh) before.
-    pub(crate) fn candidates(&self, tree: &VesselTree, region: &Region, visit: &mut dyn FnMut(NodeId)) {
-        let (min, max) = (region.min(), region.max());
-        self.index.candidates_in(region, &mut *visit);
-        for node in self.index.len()..tree.len() {
+    /// Takes over an index that has become ready, and begins to index a large tree anew where that pays.
+    fn advance(&mut self, vessels: &Vessels, log: &ChangeLog) {
+        if let Some(coming) = &mut self.coming
+            && let Some(index) = check_ready(&mut coming.task)
+        {
+            (self.index, self.cursor) = (index, coming.cursor.clone());
+            self.coming = None;
+        }
+        self.forget_others(vessels);
+        let (len, indexed) = (vessels.tree().len(), self.index.len());
+        self.idle_frames = if len == self.len { self.idle_frames.saturating_add(1) } else { 0 };
+        self.len = len;
+        let is_due = len - indexed > indexed / 2 || self.idle_frames > VesselIndex::IDLE_FRAMES;
+        if len > VesselIndex::AT_ONCE && len > indexed && is_due && self.coming.is_none() {
+            self.coming = Some(ComingIndex { task: begin(vessels.tree().clone()), cursor: log.now() });
+        }
+    }
+}
+
+/// Begins to index a tree beside the frames.
+fn begin(tree: VesselTree) -> Task<SegmentIndex> {
+    AsyncComputeTaskPool::get_or_init(TaskPool::new).spawn(async move { SegmentIndex::new(&tree) })
+}
+
+/// Vessels with their index, for questions. Both stay as they are while this is held.
+#[derive(Debug)]
+pub(crate) struct IndexedVessels<'a> {
+    pub(crate) vessels: &'a Vessels,
+    state: RwLockReadGuard<'a, IndexState>,
+}
+
+impl IndexedVessels<'_> {
+    pub(crate) fn tree(&self) -> &VesselTree {
+        self.vessels.tree()
+    }
+
+    /// Visits at least the segments that meet a region, each by its end node.
+    pub(crate) fn candidates(&self, region: &Region, visit: &mut dyn FnMut(NodeId)) {
+        let (tree, min, max) = (self.tree(), region.min(), region.max());
+        self.state.index.candidates_in(region, &mut *visit);
+        for node in self.state.index.len()..tree.len() {
             let parent = tree.parents()[node];
             if parent == NO_PARENT {
                 continue;
@@ -109,41 +181,25 @@ impl VesselIndex {
         }
     }
 
-    /// Forgets another tree's segments, and takes over an index that has become ready.
-    fn follow(&mut self, vessels: &Vessels) {
-        if self.lineage != vessels.lineage() || self.index.len() > vessels.tree().len() {
-            *self = Self { lineage: vessels.lineage(), ..Self::default() };
-        }
-        if let Some(index) = self.task.as_mut().and_then(check_ready) {
-            self.task = None;
-            self.index = index;
-            self.moved = std::mem::take(&mut self.moved_meanwhile);
-        }
-    }
-
-    /// Begins to index a large tree anew where that pays.
-    fn begin(&mut self, vessels: &Vessels, grew: bool) {
-        let (len, indexed) = (vessels.tree().len(), self.index.len());
-        self.idle_frames = if grew { 0 } else { self.idle_frames.saturating_add(1) };
-        let is_due = len - indexed > indexed / 2 || self.idle_frames > Self::IDLE_FRAMES;
-        if len > Self::AT_ONCE && len > indexed && is_due && self.task.is_none() {
-            let tree = vessels.tree().clone();
-            let pool = AsyncComputeTaskPool::get_or_init(TaskPool::new);
-            self.task = Some(pool.spawn(async move { SegmentIndex::new(&tree) }));
-            self.moved_meanwhile = Moved::None;
+    /// Lets a ray meet the segments that lie in its way. `pieces` gives what is left of each, as shares of the way from
+    /// the parent's node.
+    pub(crate) fn cast<Pieces>(&self, ray: &mut RayCast, pieces: impl Fn(NodeId) -> Pieces)
+    where
+        Pieces: IntoIterator<Item = [f32; 2]>,
+    {
+        let (tree, index) = (self.tree(), &self.state.index);
+        index.cast(tree, ray, &pieces);
+        for node in (index.len() as u32..tree.len() as u32).map(NodeId) {
+            if ray.may_meet(tree, node) {
+                ray.meet(tree, node, pieces(node));
+            }
         }
     }
 }
 
-/// Vessels with their index, to be cut.
-pub(crate) struct IndexedVessels<'a> {
-    pub(crate) vessels: &'a Vessels,
-    pub(crate) index: &'a VesselIndex,
-}
-
-impl SegmentSearch for IndexedVessels<'_> {
+impl SegmentSearch for &IndexedVessels<'_> {
     fn candidates(&mut self, region: &Region, visit: &mut dyn FnMut(NodeId)) {
-        self.index.candidates(self.vessels.tree(), region, visit);
+        IndexedVessels::candidates(self, region, visit);
     }
 
     fn leaving(&mut self, _: &VesselTree, node: NodeId, visit: &mut dyn FnMut(NodeId)) {
@@ -151,10 +207,12 @@ impl SegmentSearch for IndexedVessels<'_> {
     }
 }
 
-/// Cut: indexes go on being built.
-pub(crate) fn index_vessels(mut vessels: Query<(Ref<Vessels>, &mut VesselIndex)>) {
-    for (vessels, mut index) in &mut vessels {
-        index.follow(&vessels);
-        index.begin(&vessels, vessels.is_changed());
+/// Cut: indexes that someone asked go on being made.
+pub(crate) fn index_vessels(mut vessels: Query<(&Vessels, &ChangeLog, &mut VesselIndex)>) {
+    for (vessels, log, mut index) in &mut vessels {
+        let state = index.bypass_change_detection().state.get_mut().unwrap_or_else(PoisonError::into_inner);
+        if state.is_wanted {
+            state.advance(vessels, log);
+        }
     }
 }

@@ -1,6 +1,9 @@
 //! Vessel entities: the tree of one kind of vessels, what changed in it, what was done to it, and how it looks.
 
-use crate::plugin::order::{self, VesselSystems};
+use crate::plugin::{
+    job,
+    order::{self, VesselSystems},
+};
 use bevy::{
     app::{App, Plugin, Update},
     ecs::{
@@ -11,21 +14,26 @@ use bevy::{
 
 pub(crate) mod appearance;
 pub(crate) mod change_log;
+pub(crate) mod changes;
 pub(crate) mod index;
+pub(crate) mod lineage;
 pub(crate) mod pick;
 pub(crate) mod relations;
+mod saved;
 pub(crate) mod tree;
 pub(crate) mod wounds;
 
 pub use appearance::{SegmentColoring, VesselAppearance};
-pub use change_log::SegmentChanges;
+pub use change_log::{ChangeCursor, ChangeLog};
+pub use changes::Changes;
 pub use index::VesselIndex;
 pub use pick::{VesselPicker, VesselPlace};
 pub use relations::{OrganVessels, VesselsOf};
 pub use tree::Vessels;
 pub use wounds::VesselWounds;
 
-/// What every room needs of vessel entities: that they are shown or hidden, and indexed.
+/// What every room needs of vessel entities: that they are shown or hidden, and indexed. And what takes longer than a
+/// frame is done as [`JobSettings`](crate::plugin::JobSettings) say.
 ///
 /// The other plugins of vessels add it themselves.
 #[derive(Clone, Debug)]
@@ -57,10 +65,12 @@ impl Default for VesselsPlugin {
 impl Plugin for VesselsPlugin {
     fn build(&self, app: &mut App) {
         order::configure(app, self.schedule);
+        job::register(app, self.schedule);
+        app.register_required_components::<Vessels, VesselIndex>();
         app.add_systems(
             self.schedule,
             (
-                appearance::show_kinds.in_set(VesselSystems::Publish),
+                (appearance::show_kinds, tree::mark_replaced).in_set(VesselSystems::Publish),
                 index::index_vessels.after(VesselSystems::Follow).before(VesselSystems::Cut),
             ),
         );

@@ -1,6 +1,6 @@
 //! The tree of a vessel entity, kept up to date with a growth at the cost of what changed.
 
-use crate::plugin::vessels::change_log::SegmentChanges;
+use crate::plugin::vessels::{change_log::ChangeLog, lineage::Lineage, saved::clone_as_saved};
 use crate::synthesis::{
     binding::{Binding, BindingError},
     growth::GrownTree,
@@ -8,31 +8,24 @@ use crate::synthesis::{
 };
 use bevy::{
     camera::{primitives::Aabb, visibility::Visibility},
-    ecs::component::Component,
+    ecs::{
+        component::Component, lifecycle::HookContext, query::Changed, reflect::ReflectComponent, system::Query,
+        world::DeferredWorld,
+    },
     math::Vec3,
+    reflect::{Reflect, ReflectDeserialize, ReflectSerialize},
     transform::components::Transform,
 };
-use std::{
-    borrow::Cow,
-    sync::atomic::{AtomicU64, Ordering},
-};
-
-/// Tells one tree from another that took its place. The same while a tree grows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Lineage(u64);
-
-impl Lineage {
-    /// One that no other tree has.
-    pub fn new_one() -> Self {
-        static NEXT: AtomicU64 = AtomicU64::new(1);
-        Self(NEXT.fetch_add(1, Ordering::Relaxed))
-    }
-}
+use std::borrow::Cow;
 
 /// The vessels of one kind of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
 /// off its surface where the settings say so.
-#[derive(Component, Clone, Debug)]
-#[require(SegmentChanges, Transform, Visibility)]
+///
+/// Scenes and clones of the entity keep a given tree, but not one that grew: that grows again from mesh, settings and seed.
+#[derive(Component, Clone, Debug, Reflect)]
+#[component(on_insert = mark_inserted, clone_behavior = Custom(clone_as_saved))]
+#[reflect(opaque, Component, Clone(Vessels::as_saved), Debug, PartialEq, Serialize, Deserialize)]
+#[require(ChangeLog, Transform, Visibility)]
 pub struct Vessels {
     kind: VesselKind,
     tree: VesselTree,
@@ -43,8 +36,14 @@ pub struct Vessels {
     /// Next child of the same parent, [`NO_PARENT`] for the last.
     next_siblings: Vec<u32>,
     bounds: Option<(Vec3, Vec3)>,
+    /// At least the largest radius.
+    widest_radius: f32,
     /// Positions at rest, while the organ is deformed.
     rest: Option<Vec<Vec3>>,
+    /// Whether the tree is that of a growth.
+    is_grown: bool,
+    /// Hash of the tree that they were saved with.
+    saved_hash: Option<u64>,
 }
 
 impl Vessels {
@@ -58,22 +57,59 @@ impl Vessels {
             first_children: Vec::new(),
             next_siblings: Vec::new(),
             bounds: None,
+            widest_radius: 0.0,
             rest: None,
+            is_grown: true,
+            saved_hash: None,
         }
     }
 
     /// Vessels that did not grow here, such as a network read from a file, to be drawn like others.
     ///
-    /// They count as other vessels than those that they replace, so that wounds of these are forgotten. Put them on an
-    /// entity that is [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. Whoever replaces them later marks what
-    /// became different in the entity's [`SegmentChanges`]. Nodes beyond the end of `birth_steps` count as born in
-    /// step 0.
+    /// Put them on an entity that is [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. Where they
+    /// take the place of others, wounds of these are forgotten, and every segment counts as changed;
+    /// [`update_from_tree`](Self::update_from_tree) keeps what goes on. Nodes beyond the end of `birth_steps` count as
+    /// born in step 0.
     pub fn from_tree(kind: VesselKind, tree: &VesselTree, birth_steps: &[u32]) -> Self {
-        let mut vessels = Self { lineage: Lineage::new_one(), ..Self::new(kind) };
+        let mut vessels = Self { lineage: Lineage::new_one(), is_grown: false, ..Self::new(kind) };
         for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
             vessels.push(position, tree.parents()[node], radius, birth_steps.get(node).copied().unwrap_or(0));
         }
         vessels
+    }
+
+    /// Takes over what became of vessels that did not grow here: nodes that moved, have another radius or birth step,
+    /// and new ones.
+    ///
+    /// Exactly the segments that differ are marked in `log`, the [`ChangeLog`] of the same entity. Wounds stay as long as
+    /// every node that was there keeps its parent. Otherwise, and where the tree became shorter, these count as other
+    /// vessels, as with [`from_tree`](Self::from_tree). The cost is that of a comparison of all nodes.
+    pub fn update_from_tree(&mut self, tree: &VesselTree, birth_steps: &[u32], log: &mut ChangeLog) {
+        let known = self.tree.len();
+        if !tree.parents().starts_with(self.tree.parents()) {
+            *self = Self::from_tree(self.kind, tree, birth_steps);
+            log.begin_tree(self.lineage);
+            return;
+        }
+        let state = |node: usize| {
+            let birth = birth_steps.get(node).copied().unwrap_or(0);
+            (tree.positions()[node], tree.radii()[node], birth)
+        };
+        let mut changed = Vec::new();
+        for node in 0..known {
+            let (position, radius, birth) = state(node);
+            let before = self.rest.as_deref().unwrap_or(self.tree.positions())[node];
+            if (before, self.tree.radii()[node], self.birth_steps[node]) != (position, radius, birth) {
+                self.update(node, position, radius);
+                self.birth_steps[node] = birth;
+                changed.push(node as u32);
+            }
+        }
+        for node in known..tree.len() {
+            let (position, radius, birth) = state(node);
+            self.push(position, tree.parents()[node], radius, birth);
+        }
+        self.mark(&changed, known, log);
     }
 
     /// What kind of vessels these are.
@@ -92,6 +128,26 @@ impl Vessels {
         self.lineage
     }
 
+    /// Whether the tree is that of a growth, and not a given one.
+    pub(crate) fn is_grown(&self) -> bool {
+        self.is_grown
+    }
+
+    /// Hash of the tree at rest, or of the one that was saved, until it has grown again.
+    pub(crate) fn hash(&self) -> Option<u64> {
+        if self.tree.is_empty() { self.saved_hash } else { Some(self.tree_at_rest().hash64()) }
+    }
+
+    /// Takes note of the tree that they were saved with.
+    pub(crate) fn awaiting(self, saved_hash: Option<u64>) -> Self {
+        Self { saved_hash, ..self }
+    }
+
+    /// Whether the tree is the one that they were saved with.
+    pub(crate) fn is_as_saved(&self) -> bool {
+        !self.tree.is_empty() && self.saved_hash == self.hash()
+    }
+
     /// The step in which each node was born, 0 for roots.
     pub fn birth_steps(&self) -> &[u32] {
         &self.birth_steps
@@ -106,33 +162,42 @@ impl Vessels {
 
     /// Takes over what the growth changed: `changed` nodes and all new ones, or everything where that is `None`.
     ///
-    /// Without a growth nothing is left. All segments that are other than before are marked in `changes`.
+    /// Without a growth nothing is left. All segments that are other than before are marked in the log. Another lineage
+    /// is another tree, of which everything is taken over.
     pub(crate) fn follow(
         &mut self,
         grown: Option<GrownTree>,
         lineage: Lineage,
         changed: Option<&[u32]>,
-        changes: &mut SegmentChanges,
+        log: &mut ChangeLog,
     ) {
-        self.lineage = lineage;
+        let changed = changed.filter(|_| self.lineage == lineage && log.is_of(lineage));
+        self.is_grown = true;
         if changed.is_none() {
             self.clear();
-            changes.mark_all();
+            self.lineage = lineage;
+            log.begin_tree(lineage);
         }
         let Some(grown) = grown else { return };
         let known = self.tree.len();
         for node in known..grown.tree.len() {
             self.append(&grown, node);
-            changes.mark_node(node);
         }
-        for &node in changed.unwrap_or_default() {
+        let Some(changed) = changed else { return };
+        for &node in changed.iter().filter(|&&node| (node as usize) < known) {
+            let position = grown.lifted_position(NodeId(node));
+            self.update(node as usize, position, grown.tree.radii()[node as usize]);
+        }
+        self.mark(changed, known, log);
+    }
+
+    /// Marks nodes that changed, their children, and all nodes from `known` on.
+    fn mark(&self, changed: &[u32], known: usize, log: &mut ChangeLog) {
+        let with_children = changed.iter().flat_map(|&node| {
             let node = node as usize;
-            if node < known {
-                self.update(&grown, node);
-                changes.mark_node(node);
-                self.children(node).for_each(|child| changes.mark_node(child));
-            }
-        }
+            std::iter::once(node).chain(self.children(node))
+        });
+        log.mark(with_children.chain(known..self.tree.len()));
     }
 
     fn clear(&mut self) {
@@ -141,6 +206,7 @@ impl Vessels {
         self.first_children.clear();
         self.next_siblings.clear();
         self.bounds = None;
+        self.widest_radius = 0.0;
         self.rest = None;
     }
 
@@ -201,20 +267,31 @@ impl Vessels {
         self.enclose(node);
     }
 
-    fn update(&mut self, grown: &GrownTree, node: usize) {
-        let position = grown.lifted_position(NodeId(node as u32));
+    fn update(&mut self, node: usize, position: Vec3, radius: f32) {
         self.tree.positions_mut()[node] = position;
         if let Some(rest) = &mut self.rest {
             rest[node] = position;
         }
-        self.tree.radii_mut()[node] = grown.tree.radii()[node];
+        self.tree.radii_mut()[node] = radius;
         self.enclose(node);
+    }
+
+    /// At least the largest radius of all segments.
+    pub(crate) fn widest_radius(&self) -> f32 {
+        self.widest_radius
+    }
+
+    /// Whether some segment, as thick as its own node throughout, may have a point in common with a box.
+    pub(crate) fn may_meet(&self, min: Vec3, max: Vec3) -> bool {
+        let room = self.widest_radius;
+        self.bounds.is_some_and(|(low, high)| (low - room).cmple(max).all() && (high + room).cmpge(min).all())
     }
 
     fn enclose(&mut self, node: usize) {
         let (position, radius) = (self.tree.positions()[node], self.tree.radii()[node]);
         let (min, max) = self.bounds.unwrap_or((position, position));
         self.bounds = Some((min.min(position - radius), max.max(position + radius)));
+        self.widest_radius = self.widest_radius.max(radius);
     }
 
     pub(crate) fn children(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
@@ -227,5 +304,23 @@ impl Vessels {
 impl PartialEq for Vessels {
     fn eq(&self, other: &Self) -> bool {
         (self.kind, &self.tree, &self.birth_steps) == (other.kind, &other.tree, &other.birth_steps)
+    }
+}
+
+/// Vessels that are inserted are others than those that were there.
+fn mark_inserted(mut world: DeferredWorld, HookContext { entity, .. }: HookContext) {
+    let lineage = world.get::<Vessels>(entity).map(Vessels::lineage);
+    let log = world.get_mut::<ChangeLog>(entity);
+    if let (Some(lineage), Some(mut log)) = (lineage, log) {
+        log.begin_tree(lineage);
+    }
+}
+
+/// Publish: vessels that were written over in place are others than those that were there, too.
+pub(crate) fn mark_replaced(mut vessels: Query<(&Vessels, &mut ChangeLog), Changed<Vessels>>) {
+    for (vessels, mut log) in &mut vessels {
+        if !log.is_of(vessels.lineage()) {
+            log.begin_tree(vessels.lineage());
+        }
     }
 }

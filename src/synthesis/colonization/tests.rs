@@ -1,7 +1,7 @@
 //! Tests that look inside a growth: exact association, and cases where nothing may break.
 
 use super::*;
-use crate::synthesis::roots::RootPlacement;
+use crate::synthesis::roots::{RootPlacement, RootPlacements};
 use crate::synthesis::tissue::TissueGrowth;
 use crate::synthesis::tissue::shape::{Ball, Disc};
 
@@ -10,11 +10,19 @@ fn disc() -> Arc<dyn Tissue> {
 }
 
 fn roots() -> Roots {
-    Roots {
-        arterial: RootPlacement::Exact(vec![Vec3::new(-0.5, 0.0, 0.0)]),
-        venous: RootPlacement::Exact(vec![Vec3::new(-0.495, 0.05, 0.0)]),
-        given: [None, None],
+    RootPlacements {
+        artery: RootPlacement::Exact(vec![Vec3::new(-0.5, 0.0, 0.0)]),
+        vein: RootPlacement::Exact(vec![Vec3::new(-0.495, 0.05, 0.0)]),
+        ..RootPlacements::default()
     }
+    .into()
+}
+
+/// The same without arteries.
+fn no_arteries() -> Roots {
+    let mut roots = roots();
+    roots.placed.artery = RootPlacement::None;
+    roots
 }
 
 fn growth(settings: ColonizationSettings) -> Colonization {
@@ -23,13 +31,13 @@ fn growth(settings: ColonizationSettings) -> Colonization {
 
 /// What must hold of both trees after every step.
 fn assert_sound(growth: &Colonization) {
-    for system in Colonization::KINDS {
-        let tree = growth.tree(system);
+    for kind in Colonization::KINDS {
+        let tree = growth.tree(kind);
         tree.validate().expect("a well-formed tree");
-        let residual = tree.murray_residual(growth.settings().system(system).expect("grown").bifurcation_exponent);
-        assert!(residual <= 1e-5, "{} residual {residual}", system.name());
-        assert_eq!(growth.normals(system).len(), tree.len());
-        assert_eq!(growth.birth_steps(system).len(), tree.len());
+        let residual = tree.murray_residual(growth.settings().system(kind).expect("grown").bifurcation_exponent);
+        assert!(residual <= 1e-5, "{} residual {residual}", kind.name());
+        assert_eq!(growth.normals(kind).len(), tree.len());
+        assert_eq!(growth.birth_steps(kind).len(), tree.len());
     }
 }
 
@@ -66,14 +74,15 @@ fn a_growth_without_samples_or_drains_rests() {
     assert_eq!(growth.tree(VesselKind::Artery).len(), 1);
     assert_eq!(growth.steps_done(), 100);
     assert!(growth.is_finished());
-    assert_eq!(growth.step().systems, [SystemReport::default(); 2]);
+    let report = growth.step();
+    assert_eq!([report.arterial, report.venous], [SystemReport::default(); 2]);
 }
 
 #[test]
 fn a_full_tissue_ends_growth_early_and_loses_nothing_by_it() {
     let mut settings = ColonizationSettings { steps: 3000, ..ColonizationSettings::default() };
-    for system in Colonization::KINDS {
-        settings.system_mut(system).tissue_growth = TissueGrowth::None;
+    for system in [&mut settings.arterial, &mut settings.venous] {
+        system.tissue_growth = TissueGrowth::None;
     }
     let mut ended = growth(settings.clone());
     ended.run();
@@ -86,11 +95,11 @@ fn a_full_tissue_ends_growth_early_and_loses_nothing_by_it() {
     let mut whole = growth(ColonizationSettings { idle_steps: 0, ..settings.clone() });
     whole.run();
     assert_eq!((stepped.steps_done(), whole.steps_done()), (steps, 3000));
-    for system in Colonization::KINDS {
-        assert_eq!(ended.tree(system), stepped.tree(system));
+    for kind in Colonization::KINDS {
+        assert_eq!(ended.tree(kind), stepped.tree(kind));
         // Some last gaps are smaller than the samples of the idle steps could find.
-        let (nodes, all) = (ended.tree(system).len(), whole.tree(system).len());
-        assert!(nodes * 100 >= all * 95, "{} has {nodes} nodes of {all}", system.name());
+        let (nodes, all) = (ended.tree(kind).len(), whole.tree(kind).len());
+        assert!(nodes * 100 >= all * 95, "{} has {nodes} nodes of {all}", kind.name());
     }
     // Where tissue grows there is always something to do again.
     settings.steps = 60;
@@ -183,9 +192,8 @@ fn growth_goes_on_from_a_given_tree() {
     let mut first = growth(ColonizationSettings { steps: 30, ..ColonizationSettings::default() });
     first.run();
     let given = first.tree(VesselKind::Artery).clone();
-    let mut roots = roots();
-    roots.arterial = RootPlacement::None;
-    roots.given = [Some(given.clone()), None];
+    let mut roots = no_arteries();
+    roots.given.artery = Some(given.clone());
     let mut second = Colonization::new(disc(), ColonizationSettings::default(), &roots, 9).expect("valid settings");
     assert_eq!(second.tree(VesselKind::Artery).positions(), given.positions());
     for (radius, expected) in second.tree(VesselKind::Artery).radii().iter().zip(given.radii()) {
@@ -200,8 +208,7 @@ fn growth_goes_on_from_a_given_tree() {
 
 #[test]
 fn growth_needs_an_arterial_root_and_names_it() {
-    let none = Roots { arterial: RootPlacement::None, ..roots() };
-    let error = Colonization::new(disc(), ColonizationSettings::default(), &none, 1).expect_err("no root");
+    let error = Colonization::new(disc(), ColonizationSettings::default(), &no_arteries(), 1).expect_err("no root");
     assert!(error.to_string().contains("no root"));
     let wrong = ColonizationSettings { steps: 0, ..ColonizationSettings::default() };
     let error = Colonization::new(disc(), wrong, &roots(), 1).expect_err("no steps");
@@ -213,8 +220,7 @@ fn a_failed_restart_leaves_the_growth_as_it_was() {
     let mut growth = growth(ColonizationSettings { steps: 20, ..ColonizationSettings::default() });
     growth.run();
     let before = growth.tree(VesselKind::Artery).clone();
-    let none = Roots { arterial: RootPlacement::None, ..roots() };
-    assert!(growth.restart(ColonizationSettings::default(), &none, 1).is_err());
+    assert!(growth.restart(ColonizationSettings::default(), &no_arteries(), 1).is_err());
     assert_eq!(growth.tree(VesselKind::Artery), &before);
 }
 
@@ -224,14 +230,14 @@ fn changed_radii_are_those_that_changed() {
     let mut before: [Vec<f32>; 2] = Default::default();
     while !growth.is_finished() {
         growth.step();
-        for system in Colonization::KINDS {
-            let radii = growth.tree(system).radii();
-            let old = &mut before[system.index()];
-            let mut changed: Vec<u32> = growth.changed_radii(system).to_vec();
+        for kind in Colonization::KINDS {
+            let radii = growth.tree(kind).radii();
+            let old = &mut before[kind.index()];
+            let mut changed: Vec<u32> = growth.changed_radii(kind).to_vec();
             changed.reverse();
             let expected = (0..radii.len() as u32).filter(|&i| old.get(i as usize) != Some(&radii[i as usize]));
             let expected: Vec<u32> = if growth.steps_done() == 1 {
-                expected.filter(|&i| growth.birth_steps(system)[i as usize] > 0 || changed.contains(&i)).collect()
+                expected.filter(|&i| growth.birth_steps(kind)[i as usize] > 0 || changed.contains(&i)).collect()
             } else {
                 expected.collect()
             };

@@ -5,6 +5,7 @@ use crate::synthesis::units::ScaleError;
 
 /// Why a network could not be made, changed or solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub enum FlowError {
     /// The tree is not well formed.
     #[error(transparent)]

@@ -3,7 +3,18 @@ use crate::synthesis::mesh::TriangleMesh;
 use crate::synthesis::tissue::{Ball, Cuboid, Disc, MeshSurface, Rectangle, TissueError};
 use bevy_math::Vec2;
 
-const SETTINGS: fn() -> ColonizationSettings = ColonizationSettings::default;
+/// Arteries and veins as space colonization grows them on a disc of diameter 1.
+const SPACING: ByKind<Option<RootSpacing>> = ByKind {
+    artery: Some(RootSpacing { step: 0.03, reach: 0.065 }),
+    vein: Some(RootSpacing { step: 0.03, reach: 0.065 * 2.5 }),
+    portal_vein: None,
+    duct: None,
+};
+
+/// Arteries so placed, and veins beside them.
+fn placed_arteries(artery: RootPlacement) -> Roots {
+    RootPlacements { artery, ..RootPlacements::default() }.into()
+}
 
 fn at(x: f32, y: f32) -> Vec3 {
     Vec3::new(x, y, 0.0)
@@ -11,23 +22,23 @@ fn at(x: f32, y: f32) -> Vec3 {
 
 #[test]
 fn the_default_is_an_artery_and_a_vein_beside_it() -> Result<(), TissueError> {
-    let settings = SETTINGS();
     for tissue in [Box::new(Disc::flat(0.5)?) as Box<dyn Tissue>, Box::new(Ball::new(Vec3::ONE, 0.5)?)] {
         for seed in 0..50 {
-            let Ok([arteries, veins]) = Roots::default().resolve(&*tissue, &settings, seed) else {
+            let Ok(roots) = Roots::default().resolve(&*tissue, &SPACING, seed) else {
                 panic!("no roots with seed {seed}")
             };
-            assert_eq!((arteries.len(), veins.len()), (1, 1));
-            let distance = arteries[0].position.distance(veins[0].position);
-            assert!((distance - settings.venous.step_length).abs() < 0.2 * settings.venous.step_length);
-            assert!(tissue.contains(arteries[0].position) && tissue.contains(veins[0].position));
-            assert_eq!(arteries[0].normal, tissue.closest_point(arteries[0].position).normal);
-            let again = Roots::default().resolve(&*tissue, &settings, seed);
-            assert_eq!(again, Ok([arteries, veins]));
+            let ([artery], [vein]) = (&roots.artery[..], &roots.vein[..]) else { panic!("one of each, not {roots:?}") };
+            assert!(roots.portal_vein.is_empty() && roots.duct.is_empty());
+            let (distance, step) = (artery.position.distance(vein.position), 0.03);
+            assert!((distance - step).abs() < 0.2 * step);
+            assert!(tissue.contains(artery.position) && tissue.contains(vein.position));
+            assert_eq!(artery.normal, tissue.closest_point(artery.position).normal);
+            let again = Roots::default().resolve(&*tissue, &SPACING, seed);
+            assert_eq!(again, Ok(roots));
         }
     }
     let tissue = Disc::flat(0.5)?;
-    let with_seed = |seed| Roots::default().resolve(&tissue, &settings, seed);
+    let with_seed = |seed| Roots::default().resolve(&tissue, &SPACING, seed);
     assert_ne!(with_seed(1), with_seed(2));
     Ok(())
 }
@@ -35,17 +46,19 @@ fn the_default_is_an_artery_and_a_vein_beside_it() -> Result<(), TissueError> {
 #[test]
 fn spread_roots_are_far_apart() -> Result<(), TissueError> {
     let tissue = Disc::flat(0.5)?;
-    let roots = Roots { arterial: RootPlacement::Spread(12), ..Roots::default() };
-    let Ok([arteries, veins]) = roots.resolve(&tissue, &SETTINGS(), 3) else { panic!("no roots") };
+    let roots = placed_arteries(RootPlacement::Spread(12));
+    let Ok(ByKind { artery: arteries, vein: veins, .. }) = roots.resolve(&tissue, &SPACING, 3) else {
+        panic!("no roots")
+    };
     assert_eq!((arteries.len(), veins.len()), (12, 12));
     for (index, root) in arteries.iter().enumerate() {
         let least = arteries[..index].iter().map(|other| other.position.distance(root.position));
         assert!(least.fold(f32::INFINITY, f32::min) > 0.2);
     }
-    let many = Roots { arterial: RootPlacement::Spread(u32::MAX), ..Roots::default() };
-    assert!(matches!(many.resolve(&tissue, &SETTINGS(), 3), Err(RootError::TooMany { .. })));
-    let none = Roots { arterial: RootPlacement::Spread(0), ..Roots::default() };
-    assert_eq!(none.resolve(&tissue, &SETTINGS(), 3), Ok([vec![], vec![]]));
+    let many = placed_arteries(RootPlacement::Spread(u32::MAX));
+    assert!(matches!(many.resolve(&tissue, &SPACING, 3), Err(RootError::TooMany { .. })));
+    let none = placed_arteries(RootPlacement::Spread(0));
+    assert_eq!(none.resolve(&tissue, &SPACING, 3), Ok(ByKind::default()));
     Ok(())
 }
 
@@ -53,16 +66,17 @@ fn spread_roots_are_far_apart() -> Result<(), TissueError> {
 fn given_points_are_taken_or_brought_to_the_tissue() -> Result<(), TissueError> {
     let tissue = Disc::flat(0.5)?;
     let far = vec![at(-2.0, 0.0)];
-    let roots = Roots {
-        arterial: RootPlacement::Nearest(far.clone()),
-        venous: RootPlacement::Exact(vec![Vec3::new(-0.4, 0.0, 0.01)]),
-        given: [None, None],
-    };
-    let Ok([arteries, veins]) = roots.resolve(&tissue, &SETTINGS(), 0) else { panic!("no roots") };
-    assert!(arteries[0].position.distance(at(-0.5, 0.0)) < 1e-6);
-    assert_eq!(veins[0], TissuePoint { position: Vec3::new(-0.4, 0.0, 0.01), normal: Vec3::Z });
+    let roots: Roots = RootPlacements {
+        artery: RootPlacement::Nearest(far.clone()),
+        vein: RootPlacement::Exact(vec![Vec3::new(-0.4, 0.0, 0.01)]),
+        ..RootPlacements::default()
+    }
+    .into();
+    let Ok(placed) = roots.resolve(&tissue, &SPACING, 0) else { panic!("no roots") };
+    assert!(placed.artery[0].position.distance(at(-0.5, 0.0)) < 1e-6);
+    assert_eq!(placed.vein[0], TissuePoint { position: Vec3::new(-0.4, 0.0, 0.01), normal: Vec3::Z });
 
-    let with = |arterial| Roots { arterial, ..Roots::default() }.resolve(&tissue, &SETTINGS(), 0);
+    let with = |artery| placed_arteries(artery).resolve(&tissue, &SPACING, 0);
     let error = with(RootPlacement::Exact(far));
     assert!(matches!(error, Err(RootError::TooFar { distance, .. }) if (distance - 1.5).abs() < 1e-6));
     let error = with(RootPlacement::Nearest(vec![Vec3::NAN]));
@@ -72,7 +86,7 @@ fn given_points_are_taken_or_brought_to_the_tissue() -> Result<(), TissueError> 
     let error = with(RootPlacement::Exact(vec![at(0.1, 0.0), at(0.0, 0.2), at(0.1, 0.0)]));
     assert!(matches!(error, Err(RootError::Coincide { .. })));
     assert_eq!(with(RootPlacement::Beside), Err(RootError::BesideEachOther));
-    assert_eq!(with(RootPlacement::None), Ok([vec![], vec![]]));
+    assert_eq!(with(RootPlacement::None), Ok(ByKind::default()));
     Ok(())
 }
 
@@ -82,11 +96,11 @@ fn given_trees_must_be_within_reach() -> Result<(), TissueError> {
     let with = |position: Vec3| {
         let mut tree = VesselTree::new();
         tree.push_root(position, 0.01);
-        let given = [Some(tree), Some(VesselTree::new())];
-        Roots { arterial: RootPlacement::None, given, ..Roots::default() }.resolve(&tissue, &SETTINGS(), 0)
+        let given = ByKind { artery: Some(tree), vein: Some(VesselTree::new()), ..ByKind::default() };
+        Roots { given, ..placed_arteries(RootPlacement::None) }.resolve(&tissue, &SPACING, 0)
     };
-    let Ok([arteries, veins]) = with(at(0.3, 0.0)) else { panic!("no roots") };
-    assert_eq!((arteries.len(), veins.len()), (0, 1));
+    let Ok(placed) = with(at(0.3, 0.0)) else { panic!("no roots") };
+    assert_eq!((placed.artery.len(), placed.vein.len()), (0, 1));
     assert!(matches!(with(at(30.0, 0.0)), Err(RootError::GivenTooFar { .. })));
     assert!(matches!(with(at(f32::NAN, 0.0)), Err(RootError::GivenNotFinite { node: 0, .. })));
     Ok(())
@@ -101,12 +115,11 @@ fn missed(tissue: &dyn Tissue, roots: &[TissuePoint], way: f32) -> usize {
 
 #[test]
 fn compact_tissues_have_one_root_and_long_ones_several_within_reach() -> Result<(), Box<dyn std::error::Error>> {
-    let settings = SETTINGS();
-    let spread = Roots { arterial: RootPlacement::Spread(1), ..Roots::default() };
+    let spread = placed_arteries(RootPlacement::Spread(1));
     for tissue in [Box::new(Disc::flat(0.5)?) as Box<dyn Tissue>, Box::new(Ball::new(Vec3::ONE, 0.5)?)] {
         for seed in 0..50 {
-            let roots = Roots::default().resolve(&*tissue, &settings, seed)?;
-            assert_eq!(roots, spread.resolve(&*tissue, &settings, seed)?, "seed {seed} of a compact tissue");
+            let roots = Roots::default().resolve(&*tissue, &SPACING, seed)?;
+            assert_eq!(roots, spread.resolve(&*tissue, &SPACING, seed)?, "seed {seed} of a compact tissue");
         }
     }
     let strip = Rectangle::flat(Vec2::new(8.0, 0.25))?;
@@ -115,7 +128,7 @@ fn compact_tissues_have_one_root_and_long_ones_several_within_reach() -> Result<
         let way = Roots::DEFAULT_REACH * size;
         assert!((tissue.extent().equivalent_diameter() - size).abs() < 1e-3);
         for seed in 0..20 {
-            let [arteries, veins] = Roots::default().resolve(&*tissue, &settings, seed)?;
+            let ByKind { artery: arteries, vein: veins, .. } = Roots::default().resolve(&*tissue, &SPACING, seed)?;
             // At the least one for two ways of 1.8. At the most as many as fit in with 0.6 of a way between them, which
             // from sample to sample goes in zigzag, by a fifth longer.
             let most = 1 + (8.0 * 1.2 / (0.6 * way)) as usize;
@@ -151,9 +164,8 @@ fn plates(gap: f32, facing: bool) -> MeshSurface {
 
 #[test]
 fn walls_that_face_each_other_have_roots_of_their_own() -> Result<(), RootError> {
-    let settings = SETTINGS();
     for seed in 0..5 {
-        let [arteries, _] = Roots::default().resolve(&plates(0.02, true), &settings, seed)?;
+        let arteries = Roots::default().resolve(&plates(0.02, true), &SPACING, seed)?.artery;
         let layers: Vec<bool> = arteries.iter().map(|root| root.position.z > 0.01).collect();
         assert!(layers.contains(&true) && layers.contains(&false), "seed {seed}: {arteries:?}");
     }
@@ -164,11 +176,11 @@ fn walls_that_face_each_other_have_roots_of_their_own() -> Result<(), RootError>
 fn a_reach_that_samples_cannot_measure_is_refused() -> Result<(), TissueError> {
     let tissue = Disc::flat(0.5)?;
     for reach in [0.0, -1.0, 0.05, f32::NAN, f32::INFINITY] {
-        let roots = Roots { arterial: RootPlacement::Within(reach), ..Roots::default() };
-        assert!(matches!(roots.resolve(&tissue, &SETTINGS(), 0), Err(RootError::Reach { .. })), "{reach}");
+        let roots = placed_arteries(RootPlacement::Within(reach));
+        assert!(matches!(roots.resolve(&tissue, &SPACING, 0), Err(RootError::Reach { .. })), "{reach}");
     }
-    let near = Roots { arterial: RootPlacement::Within(Roots::LEAST_REACH), ..Roots::default() };
-    let Ok([arteries, _]) = near.resolve(&tissue, &SETTINGS(), 0) else { panic!("no roots") };
-    assert!(missed(&tissue, &arteries, 0.1) < 20 && arteries.len() < 500, "{} roots", arteries.len());
+    let near = placed_arteries(RootPlacement::Within(Roots::LEAST_REACH));
+    let Ok(ByKind { artery: roots, .. }) = near.resolve(&tissue, &SPACING, 0) else { panic!("no roots") };
+    assert!(missed(&tissue, &roots, 0.1) < 20 && roots.len() < 500, "{} roots", roots.len());
     Ok(())
 }

@@ -11,14 +11,15 @@
 //! long.
 
 use crate::synthesis::segment_index::{
-    Region,
+    RayCast, Region,
+    ray_cast::Found,
     round_cone::RoundCone,
     run::{Run, box_of, curve_through},
 };
 use crate::synthesis::{
     space::{
         morton::Curve,
-        packed_boxes::{Pack, Ray},
+        packed_boxes::Pack,
     },
     tree::{NodeId, Place, VesselTree},
 };
@@ -235,47 +236,31 @@ impl SegmentIndex {
     /// # Panics
     /// When the tree has fewer nodes than are indexed.
     pub fn first_hit(&self, tree: &VesselTree, from: Vec3, direction: Vec3, reach: f32) -> Option<(Place, f32)> {
-        let unit = direction.as_dvec3().try_normalize()?;
-        if !(from.is_finite() && direction.is_finite() && reach >= 0.0) {
-            return None;
-        }
-        let ray = Ray::new(from, unit.as_vec3());
-        let from = from.as_dvec3();
-        let mut found = Found::up_to(reach.into());
+        let mut cast = RayCast::new(from, direction, reach)?;
+        self.cast(tree, &mut cast, |_| [[0.0, 1.0]]);
+        cast.found()
+    }
+
+    /// Lets a ray meet the segments that lie in its way, the nearest boxes first: of each the `pieces` that are left of
+    /// it, as [`RayCast::meet`] takes them.
+    ///
+    /// # Panics
+    /// When the tree has fewer nodes than are indexed.
+    pub fn cast<Pieces: IntoIterator<Item = [f32; 2]>>(
+        &self,
+        tree: &VesselTree,
+        cast: &mut RayCast,
+        pieces: impl Fn(NodeId) -> Pieces,
+    ) {
+        let ray = cast.ray;
         for run in &self.runs {
-            let limit = found.least as f32;
+            let limit = cast.found.least as f32;
             let visit = |slot: usize, _: f32| {
-                let node = run.ends[slot];
-                if let Some((distance, along)) = RoundCone::of(tree, node).and_then(|cone| cone.hit(from, unit)) {
-                    found.offer(node, along, distance);
-                }
-                found.least as f32
+                let node = NodeId(run.ends[slot]);
+                cast.meet(tree, node, pieces(node));
+                cast.found.least as f32
             };
             run.boxes.best_first(limit, |pack| pack.entries(&ray), visit);
-        }
-        found.place.map(|place| (place, found.least as f32))
-    }
-}
-
-/// The best place so far.
-struct Found {
-    least: f64,
-    place: Option<Place>,
-}
-
-impl Found {
-    fn up_to(limit: f64) -> Self {
-        Self { least: limit, place: None }
-    }
-
-    fn offer(&mut self, node: u32, along: f64, distance: f64) {
-        let better = match self.place {
-            None => distance <= self.least,
-            Some(place) => distance < self.least || (distance == self.least && node < place.node.0),
-        };
-        if better {
-            self.least = distance;
-            self.place = Some(Place::new(NodeId(node), along as f32));
         }
     }
 }

@@ -3,12 +3,14 @@
 //! In: a [`VesselTree`](crate::synthesis::tree::VesselTree). Out: a [`SegmentIndex`] that answers at any moment of a growth.
 
 mod index;
+mod ray_cast;
 mod region;
 pub(crate) mod round_cone;
 mod run;
 mod search;
 
 pub use index::SegmentIndex;
+pub use ray_cast::RayCast;
 pub use region::Region;
 pub(crate) use region::axes;
 pub use search::SegmentSearch;

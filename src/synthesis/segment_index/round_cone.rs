@@ -87,6 +87,66 @@ impl RoundCone {
         });
         side.chain(balls).filter(|(distance, _)| *distance >= 0.0).min_by(|x, y| x.0.total_cmp(&y.0))
     }
+
+    /// The same for a piece between two shares of the way: round where the segment ends, and flat where it was cut.
+    ///
+    /// Both the cone and what lies between the cuts are convex, so the ray is in each from one distance to another.
+    pub fn hit_piece(&self, from: DVec3, direction: DVec3, [first, last]: [f64; 2]) -> Option<(f64, f64)> {
+        let v = self.end - self.start;
+        let radius = |share: f64| self.start_radius + share * (self.end_radius - self.start_radius);
+        let at = |share: f64| self.start + share * v;
+        let piece =
+            Self { start: at(first), end: at(last), start_radius: radius(first), end_radius: radius(last) };
+        let [mut enter, mut leave] = piece.passage(from, direction)?;
+        let (mut cut, rate) = (None, v.dot(direction));
+        for (share, ahead) in [(first, 1.0), (last, -1.0)].into_iter().filter(|(share, _)| *share > 0.0 && *share < 1.0) {
+            let (depth, rate) = (ahead * v.dot(from - at(share)), ahead * rate);
+            let crossed = -depth / rate;
+            if rate > 0.0 && crossed > enter {
+                (enter, cut) = (crossed, Some(share));
+            } else if rate < 0.0 {
+                leave = leave.min(crossed);
+            } else if rate == 0.0 && depth < 0.0 {
+                return None;
+            }
+        }
+        if enter < 0.0 {
+            (enter, cut) = (0.0, None);
+        }
+        let nearest = || first + (last - first) * piece.nearest(from + direction * enter).0;
+        (enter <= leave).then(|| (enter, cut.unwrap_or_else(nearest)))
+    }
+
+    /// From where to where a line of unit direction is in the cone; negative before its origin.
+    ///
+    /// The cone is the hull of its two end balls: of the points in which the line meets these or the side, the first and
+    /// the last are those of the cone. See [`hit`](Self::hit).
+    fn passage(&self, from: DVec3, direction: DVec3) -> Option<[f64; 2]> {
+        let (v, k) = (self.end - self.start, self.end_radius - self.start_radius);
+        let to_from = from - self.start;
+        let h = v.length_squared() - k * k;
+        let ball = |to_from: DVec3, radius: f64| {
+            roots(1.0, to_from.dot(direction), to_from.length_squared() - radius * radius)
+        };
+        let ends = [ball(to_from, self.start_radius), ball(from - self.end, self.end_radius)];
+        let mut side = [f64::NAN; 2];
+        if h > 0.0 {
+            let (s0, s1) = ((v.dot(to_from) + k * self.start_radius) / h, v.dot(direction) / h);
+            let a = 1.0 - s1 * s1 * h;
+            let b = to_from.dot(direction) - s0 * s1 * h;
+            let c = to_from.length_squared() - self.start_radius * self.start_radius - s0 * s0 * h;
+            side = roots(a, b, c).map(|t| if (0.0..=1.0).contains(&(s0 + s1 * t)) { t } else { f64::NAN });
+        }
+        let met = side.into_iter().chain(ends.into_iter().flatten()).filter(|t| t.is_finite());
+        let (enter, leave) = met.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));
+        (enter <= leave).then_some([enter, leave])
+    }
+
+    /// A ball that holds the whole segment: its centre and radius.
+    pub fn ball_around(&self) -> (DVec3, f64) {
+        let center = self.start.midpoint(self.end);
+        (center, 0.5 * self.start.distance(self.end) + self.start_radius.max(self.end_radius))
+    }
 }
 
 /// How far along a ray of unit direction a ball begins, 0 from inside.

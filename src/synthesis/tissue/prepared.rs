@@ -1,10 +1,13 @@
 //! A tissue with everything that takes long to prepare, kept so that paint can be laid over it again and again.
 
 use super::{
-    DensityField, DensityTissue, GuidePath, MeshSurface, MeshVolume, NoGoField, NoGoTissue, Staged, Tissue, TissueError,
-    TissueMode, TissuePaint,
+    DensityField, DensityTissue, GuidePath, MeshSurface, MeshTissue, MeshVolume, NoGoField, NoGoTissue, Staged, Tissue,
+    TissueError, TissueMode, TissuePaint,
 };
-use crate::synthesis::mesh::{IndexedMesh, TriangleMesh};
+use crate::synthesis::{
+    mesh::{IndexedMesh, TriangleMesh},
+    pace::Pace,
+};
 use std::sync::{Arc, OnceLock};
 
 /// A tissue made from its [source](super::TissueSource), before anything is painted on it. A clone shares all of it.
@@ -50,15 +53,19 @@ impl PreparedTissue {
     ///
     /// # Errors
     /// [`TissueError::Voxels`] and [`TissueError::NoInside`], where the inside is needed.
-    pub fn of_mesh(mesh: Arc<TriangleMesh>, mode: TissueMode, resolution: u32) -> Result<Self, TissueError> {
+    pub(super) async fn of_mesh(
+        mesh: Arc<TriangleMesh>,
+        settings: &MeshTissue,
+        _pace: &Pace,
+    ) -> Result<Self, TissueError> {
         let indexed = OnceLock::new();
         let surface = || -> Result<Arc<dyn Tissue>, TissueError> {
             let surface = MeshSurface::new(Arc::clone(&mesh))?;
             indexed.get_or_init(|| surface.indexed().clone());
             Ok(Arc::new(surface))
         };
-        let volume = || MeshVolume::new(&mesh, resolution).map(|volume| Arc::new(volume) as Arc<dyn Tissue>);
-        let (stages, last) = match mode {
+        let volume = || MeshVolume::new(&mesh, settings.resolution).map(|volume| Arc::new(volume) as Arc<dyn Tissue>);
+        let (stages, last) = match settings.mode {
             TissueMode::Surface => (Vec::new(), surface()?),
             TissueMode::Volume => (Vec::new(), volume()?),
             TissueMode::Staged { surface_steps } => (vec![(surface()?, surface_steps)], volume()?),

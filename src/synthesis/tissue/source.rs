@@ -3,7 +3,10 @@
 use super::{
     Ball, Cuboid, Disc, Ellipsoid, Mask, MeshVolume, PreparedTissue, Rectangle, Tissue, TissueError, error::finite,
 };
-use crate::synthesis::mesh::TriangleMesh;
+use crate::synthesis::{
+    mesh::TriangleMesh,
+    pace::{Pace, at_once},
+};
 use bevy_math::{UVec3, Vec3};
 use std::sync::Arc;
 
@@ -36,12 +39,29 @@ impl TissueSource {
     /// [`TissueError::NoMesh`] and [`TissueError::NoImage`] where that is needed and left out; what is wrong with the
     /// settings, or with the organ for this purpose.
     pub fn prepare(&self, data: &SourceData) -> Result<PreparedTissue, TissueError> {
+        at_once(self.prepare_paced(data, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`prepare`](Self::prepare).
+    pub async fn prepare_paced(&self, data: &SourceData, pace: &Pace) -> Result<PreparedTissue, TissueError> {
         match self {
-            Self::Mesh(mesh) => mesh.prepare(data.mesh.clone().ok_or(TissueError::NoMesh)?),
+            Self::Mesh(mesh) => mesh.prepare_paced(data.mesh.clone().ok_or(TissueError::NoMesh)?, pace).await,
             Self::Shape(shape) => PreparedTissue::new(shape.build()?),
             Self::Image(image) => {
                 PreparedTissue::new(Arc::new(image.mask(data.image.as_deref().ok_or(TissueError::NoImage)?)?))
             }
+        }
+    }
+
+    /// How much work it is to [prepare](Self::prepare) the tissue of so many triangles, or pixels of an image, in items.
+    pub fn work(&self, items: usize) -> usize {
+        match self {
+            Self::Mesh(mesh) => mesh.work(items),
+            Self::Shape(_) => 0,
+            Self::Image(_) => items,
         }
     }
 
@@ -136,12 +156,30 @@ impl MeshTissue {
     /// Voxels along the longest side of the organ.
     pub const DEFAULT_RESOLUTION: u32 = MeshVolume::DEFAULT_RESOLUTION;
 
+    /// How much work it is to [prepare](Self::prepare) the tissue of so many triangles, in items: the triangles, and the
+    /// voxels where the inside is needed.
+    pub fn work(&self, triangles: usize) -> usize {
+        let voxels = || (self.resolution as usize).saturating_pow(3);
+        match self.mode {
+            TissueMode::Surface => triangles,
+            TissueMode::Volume | TissueMode::Staged { .. } => triangles.saturating_add(voxels()),
+        }
+    }
+
     /// Makes everything of a mesh's tissue that takes long.
     ///
     /// # Errors
     /// What is wrong with the settings, or with the mesh for this purpose: see [`TissueError`].
     pub fn prepare(&self, mesh: impl Into<Arc<TriangleMesh>>) -> Result<PreparedTissue, TissueError> {
-        PreparedTissue::of_mesh(mesh.into(), self.mode, self.resolution)
+        at_once(self.prepare_paced(mesh.into(), &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`prepare`](Self::prepare).
+    pub async fn prepare_paced(&self, mesh: Arc<TriangleMesh>, pace: &Pace) -> Result<PreparedTissue, TissueError> {
+        PreparedTissue::of_mesh(mesh, self, pace).await
     }
 }
 

@@ -62,6 +62,7 @@ pub enum BladeError {
 /// A surface blade owns its edges and corners: a centre line that passes exactly through one is severed, once, however
 /// many triangles meet there.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct Blade {
     pub(super) shape: Shape,
 }

@@ -7,6 +7,7 @@ use bevy_math::Vec3;
 /// A severed end of a vessel. Stays the same while the end exists, through clamps, seals, and the undoing of what took
 /// it away; never given to another end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct EndId {
     /// Place in the ledger's list.
@@ -17,6 +18,7 @@ pub struct EndId {
 
 /// A clamp on a vessel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct ClampId {
     /// Place in the ledger's list.
@@ -27,6 +29,7 @@ pub struct ClampId {
 
 /// One end of a severed vessel, where it is now.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct SeveredEnd {
     /// What it is known by.
     pub id: EndId,
@@ -52,6 +55,7 @@ pub struct SeveredEnd {
 /// Ends that were open before and after are in neither list, nor are those that were closed both times, such as the ends
 /// of a cut through a sealed vessel.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct WoundReport {
     /// Number of places at which a vessel was severed. 0 for all but cuts.
     pub severed: usize,

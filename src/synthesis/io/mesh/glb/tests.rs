@@ -1,6 +1,6 @@
 //! Files of every make that is read, and damaged ones.
 
-use crate::synthesis::io::glb::*;
+use super::*;
 use crate::synthesis::mesh::MeshError;
 
 /// A binary file of a JSON text and data.

@@ -12,18 +12,17 @@ use bevy_vessels::{
 };
 
 /// An app in which each frame lasts as long as is said.
-pub fn theatre(frame: Duration) -> App {
+pub fn timed_app(frame: Duration) -> App {
     let mut app = headless(GrowthBudget::Steps(1000));
     app.insert_resource(TimeUpdateStrategy::ManualDuration(frame));
     app
 }
 
-/// An organ with vessels of its own, each a tree for a system, without a mesh.
+/// An organ with vessels of its own, each a tree of a kind, without a mesh.
 pub fn organ_of(app: &mut App, trees: &[(VesselKind, &VesselTree)], components: impl Bundle) -> Entity {
     let organ = app.world_mut().spawn((Transform::default(), Visibility::default(), components)).id();
-    for &(system, tree) in trees {
-        let relations = (ChildOf(organ), VesselsOf(organ));
-        app.world_mut().spawn((relations, VesselSystem(system), Vessels::from_tree(tree, &[])));
+    for &(kind, tree) in trees {
+        app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), Vessels::from_tree(kind, tree, &[])));
     }
     app.update();
     organ
@@ -56,9 +55,9 @@ pub fn square(center: Vec3, normal: Vec3, size: f32) -> Blade {
 }
 
 /// Clamps all segments that leave a root.
-pub fn clamp_roots(app: &mut App, organ: Entity, system: VesselKind) {
-    let entity = vessel_entity(app.world(), organ, system).expect("the system has vessels");
-    let tree = published(app.world(), organ, system).tree().clone();
+pub fn clamp_roots(app: &mut App, organ: Entity, kind: VesselKind) {
+    let entity = vessel_entity(app.world(), organ, kind).expect("the kind has vessels");
+    let tree = published(app.world(), organ, kind).tree().clone();
     let first = tree.segments().filter(|&(_, parent)| tree.parents()[parent] == NO_PARENT);
     let first: Vec<NodeId> = first.map(|(node, _)| NodeId(node as u32)).collect();
     operate(app, |vessels| first.iter().for_each(|&node| vessels.clamp_at(entity, Place::new(node, 0.5))));
@@ -73,19 +72,19 @@ pub fn cut(app: &mut App, blade: Blade) {
     operate(app, |vessels| vessels.cut(blade));
 }
 
-pub fn wounds(world: &World, organ: Entity, system: VesselKind) -> &VesselWounds {
-    let vessels = vessel_entity(world, organ, system).expect("the system has vessels");
+pub fn wounds(world: &World, organ: Entity, kind: VesselKind) -> &VesselWounds {
+    let vessels = vessel_entity(world, organ, kind).expect("the kind has vessels");
     world.get::<VesselWounds>(vessels).expect("the vessels can be cut")
 }
 
-pub fn severed(world: &World, organ: Entity, system: VesselKind) -> Vec<NodeId> {
-    wounds(world, organ, system).severed_segments().collect()
+pub fn severed(world: &World, organ: Entity, kind: VesselKind) -> Vec<NodeId> {
+    wounds(world, organ, kind).severed_segments().collect()
 }
 
-/// All open ends, in the order of systems and ids.
+/// All open ends, in the order of kinds and ids.
 pub fn open_ends(app: &mut App) -> Vec<OpenEnd> {
     let mut ends: Vec<OpenEnd> = app.world_mut().query::<&OpenEnd>().iter(app.world()).copied().collect();
-    ends.sort_by_key(|end| (end.organ, end.system, end.id));
+    ends.sort_by_key(|end| (end.organ, end.kind, end.id));
     ends
 }
 
