@@ -40,7 +40,7 @@ fn spawn_colon(stage: &mut Stage) -> (Colon, Transform) {
     for (side, roots) in [(&colon.outer, &colon.roots), (&colon.inner, &colon.inner_roots)] {
         let mut wish = Vasculature::new(PresetName::Colon)
             .with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()));
-        wish.tissue.mode = TissueMode::Surface;
+        wish.tissue = TissueMode::Surface.into();
         for system in VesselKind::ALL {
             wish.settings.system_mut(system).terminal_radius *= 1.4;
         }
