@@ -49,6 +49,8 @@ mod injury;
 mod ledger;
 mod report;
 mod retraction;
+#[cfg(feature = "serialize")]
+mod saved;
 mod stumps;
 mod withdrawal;
 
