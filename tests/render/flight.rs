@@ -17,7 +17,6 @@ use bevy_vessels::{
         preset::PresetName,
         roots::RootPlacement,
         tissue::TissueMode,
-        tree::VesselKind,
     },
 };
 
