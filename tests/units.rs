@@ -8,7 +8,6 @@ use bevy_vessels::synthesis::{
     mesh::TriangleMesh,
     roots::Roots,
     tissue::{MeshTissue, TissueMode},
-    tree::VesselKind,
 };
 
 /// An organ of a unit's size, larger by a factor.

@@ -70,6 +70,7 @@ impl Plugin for VesselsPlugin {
         app.add_systems(
             self.schedule,
             (
+                relations::mend_relations.before(VesselSystems::Source),
                 (appearance::show_kinds, tree::mark_replaced).in_set(VesselSystems::Publish),
                 index::index_vessels.after(VesselSystems::Follow).before(VesselSystems::Cut),
             ),

@@ -1,11 +1,7 @@
 //! The ledger of what was done to the vessels of a vessel entity.
 
 use crate::{
-    plugin::vessels::{
-        change_log::ChangeLog,
-        lineage::Lineage,
-        tree::Vessels,
-    },
+    plugin::vessels::{change_log::ChangeLog, lineage::Lineage, tree::Vessels},
     synthesis::{
         tree::Place,
         wound::{ClampId, WoundReport, Wounds},

@@ -107,6 +107,17 @@ impl PreparedTissue {
         in_stages(stages, laid(&self.last)?)
     }
 
+    /// How much work it is to lay this paint over the tissue, in items: vertices, and triangles where their index has yet to
+    /// be made.
+    pub fn painting_work(&self, paint: &TissuePaint) -> usize {
+        let vertices = [paint.density.as_ref().map(Vec::len), paint.no_go.vertices.as_ref().map(Vec::len)];
+        let painted = vertices.iter().flatten().sum::<usize>();
+        let is_bare = |canvas: &&Arc<Canvas>| painted > 0 && canvas.indexed.get().is_none();
+        let triangles = self.canvas.as_ref().filter(is_bare).map_or(0, |canvas| canvas.mesh.triangles().len());
+        // A value costs a small part of what an item of other work does.
+        triangles + painted / 16
+    }
+
     fn canvas(&self, what: &'static str) -> Result<&IndexedMesh, TissueError> {
         self.canvas.as_deref().map(Canvas::indexed).ok_or(TissueError::NoVertices { what })
     }

@@ -8,7 +8,7 @@ use bevy_math::Vec3;
 /// it away; never given to another end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(Clone, Hash, PartialEq))]
 pub struct EndId {
     /// Place in the ledger's list.
     pub index: u32,
