@@ -8,7 +8,7 @@
 //! | `.` | one step |
 //! | `N` | the next seed |
 //! | `A`, `V` | arteries, veins on and off |
-//! | `C` | colour by system, radius, age, Strahler order |
+//! | `C` | colour by kind, radius, age, Strahler order |
 //! | `I` | look from inside; then ↑ and ↓ travel along the lumen |
 //!
 //! `--mesh FILE.glb` takes an organ of your own, in any unit. `--headless` draws to files instead of a window, as it does

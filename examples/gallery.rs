@@ -12,7 +12,7 @@ use bevy_vessels::{
     prelude::*,
     synthesis::{
         organ::{LiverSettings, Viewpoint},
-        tree::VesselKind,
+        tree::ByKind,
     },
 };
 use clap::Parser;
@@ -32,7 +32,7 @@ struct Args {
     seed: u64,
 }
 
-/// What is on each disc: caption, preset, and the one system to show where it isn't both.
+/// What is on each disc: caption, preset, and the one kind of vessels to show where it isn't both.
 const DISCS: [(&str, PresetName, Option<VesselKind>); 6] = [
     ("arteries", PresetName::Paper, Some(VesselKind::Artery)),
     ("veins", PresetName::Paper, Some(VesselKind::Vein)),
@@ -57,9 +57,9 @@ fn main() -> AppExit {
 
 /// Vessels with their radii multiplied, so that they show from afar.
 fn stouter(mut wish: Vasculature, radii: f32) -> Vasculature {
-    for system in VesselKind::ALL {
-        wish.settings.system_mut(system).terminal_radius *= radii;
-    }
+    let settings = wish.generator.colonization_mut().expect("presets colonize");
+    settings.arterial.terminal_radius *= radii;
+    settings.venous.terminal_radius *= radii;
     wish
 }
 
@@ -71,15 +71,11 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     for (index, (caption, preset, only)) in DISCS.into_iter().enumerate() {
         let place = Transform::from_xyz((index % 3) as f32 * 1.12 - 1.12, 0.6 - (index / 3) as f32 * 1.2, 0.0);
         let disc = Circle::new(0.5).mesh().resolution(160).build();
-        let shows = |system| only.is_none_or(|only| only == system);
+        let shown = ByKind::from_fn(|kind| only.is_none_or(|only| only == kind));
         assets.spawn(&mut commands, disc, Color::srgb(0.93, 0.87, 0.82), place).insert((
             Name::new(preset.name()),
             stouter(Vasculature::new(preset).with_seed(args.seed), 2.5),
-            VesselAppearance {
-                show_arterial: shows(VesselKind::Artery),
-                show_venous: shows(VesselKind::Vein),
-                ..default()
-            },
+            VesselAppearance { shown, ..default() },
         ));
         let text = (Text::new(caption), TextFont { font_size: FontSize::Px(15.0), ..default() });
         let node = Node { position_type: PositionType::Absolute, ..default() };
@@ -93,15 +89,13 @@ fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let liver = LiverSettings { seed: args.seed, ..default() }.generate()?;
     let place = to_unit_size(liver.mesh.bounds());
     let place = place.with_translation(place.translation + LIVER);
-    let roots = [&liver.roots.arterial, &liver.roots.venous].map(|sites| RootPlacement::Nearest(sites.clone()));
-    let [arterial, venous] = roots;
     let mut wish = stouter(Vasculature::new(PresetName::Liver).with_seed(args.seed), 2.0);
     // Coarser than the preset, so that one can look through.
-    wish.settings = wish.settings.scaled(1.5);
+    wish.generator = wish.generator.scaled(1.5);
+    wish.roots.artery = RootPlacement::Nearest(liver.roots.arterial.clone());
+    wish.roots.vein = RootPlacement::Nearest(liver.roots.venous.clone());
     let glass = Color::srgba(1.0, 0.9, 0.85, 0.16);
-    assets
-        .spawn(&mut commands, liver.mesh.into(), glass, place)
-        .insert((Name::new("liver"), wish.with_roots(arterial, venous)));
+    assets.spawn(&mut commands, liver.mesh.into(), glass, place).insert((Name::new("liver"), wish));
     let view = moved(&liver.front, &place);
     shots.0.push(Shot { file: "liver.png", view, field_of_view: 36.0, endoscope: false });
     Ok(())

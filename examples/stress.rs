@@ -83,10 +83,9 @@ fn spawn_organs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets
         let place = Vec3::new(column + 0.5 - 0.5 * in_row, 0.5 * in_row - row - 0.5, 0.0) / in_row;
         let place = Transform::from_translation(place).with_scale(Vec3::splat(0.9 / in_row));
         let disc = Circle::new(0.5).mesh().resolution(64).build();
-        let mut vessels = Vasculature::new(PresetName::Paper)
-            .with_seed(u64::from(organ))
-            .with_roots(RootPlacement::Nearest(vec![Vec3::new(-0.5, 0.0, 0.0)]), RootPlacement::Beside);
-        vessels.settings = vessels.settings.scaled(args.lengths.clamp(0.1, 4.0));
+        let mut vessels = Vasculature::new(PresetName::Paper).with_seed(u64::from(organ));
+        vessels.roots.artery = RootPlacement::Nearest(vec![Vec3::new(-0.5, 0.0, 0.0)]);
+        vessels.generator = vessels.generator.scaled(args.lengths.clamp(0.1, 4.0));
         assets.spawn(&mut commands, disc, Color::srgb(0.8, 0.7, 0.66), place).insert(vessels);
     }
 }
@@ -122,7 +121,7 @@ fn finish(
         return;
     }
     record.told = true;
-    let nodes: usize = organs.iter().flat_map(|progress| progress.nodes).sum();
+    let nodes: usize = organs.iter().flat_map(|progress| progress.nodes.values()).sum();
     println!("{} organs, {} nodes each, budget {} ms", args.organs, nodes / organs.iter().len(), args.budget);
     println!("growth systems: {}", percentiles(&record.growth));
     println!("whole frames:   {}", percentiles(&record.frames));

@@ -76,7 +76,7 @@ pub mod prelude {
     pub use crate::synthesis::generator::Generator;
     pub use crate::synthesis::preset::PresetName;
     pub use crate::synthesis::roots::{RootPlacement, RootPlacements};
-    pub use crate::synthesis::tissue::{TissueMode, TissueSettings};
+    pub use crate::synthesis::tissue::{TissueMode, TissueSource};
     pub use crate::synthesis::tree::VesselKind;
     pub use crate::synthesis::wound::Blade;
 }

@@ -101,8 +101,8 @@ fn a_line_has_the_fields_that_scripts_read() {
     let line: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(line.as_object().expect("an object").len(), keys.len());
     assert_eq!((&line["tissue"], &line["preset"], &line["steps"]), (&"box".into(), &"paper".into(), &12.into()));
-    for system in ["arterial", "venous"] {
-        let measures = line[system].as_object().expect("an object");
+    for kind in ["arterial", "venous"] {
+        let measures = line[kind].as_object().expect("an object");
         assert_eq!(measures.len(), 13);
         for key in [
             "nodes",
@@ -119,7 +119,7 @@ fn a_line_has_the_fields_that_scripts_read() {
             "coverage",
             "outside",
         ] {
-            assert!(measures.contains_key(key), "{system} {key}");
+            assert!(measures.contains_key(key), "{kind} {key}");
         }
     }
     assert!(line["arterial"]["coverage"].as_f64().is_some_and(|share| share > 0.0 && share < 1.0));
@@ -136,12 +136,12 @@ fn files_hold_the_vessels_that_are_reported() {
     assert_eq!(files, names.map(|name| Path::new(&out).join(name).display().to_string()));
     assert_eq!(fs::read_dir(&out).expect("a folder").count(), 4, "nothing else is left there");
     let mut segments = 0;
-    for (file, system) in files.iter().zip(["arterial", "venous"]) {
+    for (file, kind) in files.iter().zip(["arterial", "venous"]) {
         let tree = load_swc(file, &SwcReadOptions::default()).expect("a tree");
         let statistics = tree.statistics();
-        assert_eq!(line[system]["nodes"].as_u64(), Some(statistics.nodes as u64));
-        assert_eq!(line[system]["leaves"].as_u64(), Some(statistics.leaves as u64));
-        assert_eq!(line[system]["total_length"].as_f64(), Some(statistics.total_length), "a ball lifts nothing");
+        assert_eq!(line[kind]["nodes"].as_u64(), Some(statistics.nodes as u64));
+        assert_eq!(line[kind]["leaves"].as_u64(), Some(statistics.leaves as u64));
+        assert_eq!(line[kind]["total_length"].as_f64(), Some(statistics.total_length), "a ball lifts nothing");
         segments += tree.segments().count();
         let text = fs::read_to_string(file).expect("text");
         assert!(text.contains("seed 3") && text.contains(line["hash"].as_str().expect("a hash")));
@@ -168,9 +168,9 @@ fn one_value_is_set_by_its_path() {
     let hash = |arguments: &[&str]| generate(arguments)[0]["hash"].clone();
     let plain = hash(&[]);
     assert_ne!(hash(&["--set", "arterial.direction_weight=0.9"]), plain);
-    assert_eq!(hash(&["--set", "settings.arterial.direction_weight = 0.5"]), plain, "the default it had");
+    assert_eq!(hash(&["--set", "generator.arterial.direction_weight = 0.5"]), plain, "the default it had");
     assert_eq!(hash(&["--set=arterial.direction_weight=0.9", "--set=arterial.direction_weight=0.5"]), plain);
-    assert_ne!(hash(&["--set", "arterial_roots=Nearest([(0.5, 0, 0), (-0.5, 0, 0)])"]), plain);
+    assert_ne!(hash(&["--set", "roots.artery=Nearest([(0.5, 0, 0), (-0.5, 0, 0)])"]), plain);
     assert_ne!(hash(&["--set", "venous.tissue_growth=Exponential(0.01)"]), plain);
     assert_eq!(generate(&["--set=steps=99"])[0]["steps"], 12, "an option of its own counts more");
     // Infinite thresholds survive being set and being left alone.
@@ -252,7 +252,7 @@ fn an_organ_in_any_unit_gets_as_many_vessels() {
         let counts = [("metres.obj", 0.05), ("millimetres.obj", 50.0), ("toy.obj", 25.0)].map(|(name, radius)| {
             let text = run(&["--json", "--tissue", &ball(&folder, name, radius), mode]).expect("an organ");
             let line: Value = serde_json::from_str(&text).expect("a line of JSON");
-            ["arterial", "venous"].map(|system| line[system]["nodes"].as_f64().expect("a number of nodes"))
+            ["arterial", "venous"].map(|kind| line[kind]["nodes"].as_f64().expect("a number of nodes"))
         });
         let [metres, others @ ..] = counts;
         assert!(metres.iter().all(|&nodes| nodes > 300.0), "{mode}: {metres:?} are too few to tell");
@@ -267,7 +267,7 @@ fn an_organ_in_any_unit_gets_as_many_vessels() {
 fn wrong_usage_is_named_with_exit_code_2() {
     for (arguments, expected) in [
         (&["--set=arterial.foo=1"][..], "no setting \"foo\" in arterial; there are direction_weight, "),
-        (&["--set=foo=1"], "no setting \"foo\" in settings; there are steps, "),
+        (&["--set=foo=1"], "no setting \"foo\" in generator; there are steps, "),
         (&["--set=foo"], "give it as key=value"),
         (&["--set=arterial.kill_distance.x=1"], "kill_distance has no fields"),
         (&["--set=samples=3, steps: 4"], "not a RON value"),
@@ -300,7 +300,7 @@ fn what_goes_wrong_is_named_with_exit_code_1_and_leaves_nothing_half_done() {
     let folder = Folder::new("failures");
     let (file, bad) = (folder.path("file"), folder.path("bad.ron"));
     fs::write(&file, "in the way").expect("a file");
-    fs::write(&bad, "(settings: (steps: 3,, ))").expect("a file");
+    fs::write(&bad, "(generator: Colonization((steps: 3,, )))").expect("a file");
     let (missing, broken) = (folder.path("missing.glb"), folder.path("broken.glb"));
     fs::write(&broken, "no mesh").expect("a file");
     for (arguments, named) in [
@@ -309,7 +309,7 @@ fn what_goes_wrong_is_named_with_exit_code_1_and_leaves_nothing_half_done() {
         (&["--tissue", &missing], "missing.glb"),
         (&["--tissue", &broken], "broken.glb"),
         (&["--out", &file], "cannot make the folder"),
-        (&["--set=arterial_roots=Exact([(9, 9, 9)])"], "disc with seed 1: "),
+        (&["--set=roots.artery=Exact([(9, 9, 9)])"], "disc with seed 1: "),
     ] {
         let (code, message) = failure(arguments);
         assert_eq!(code, 1, "{arguments:?}: {message}");

@@ -10,7 +10,7 @@ use bevy_vessels::synthesis::{
     io::load_mesh,
     preset::PresetName,
     random::Stream,
-    tissue::{Tissue, TissueMode},
+    tissue::{SourceData, Tissue, TissueMode},
     tree::{VesselKind, statistics},
 };
 use std::{path::Path, sync::Arc};
@@ -53,13 +53,15 @@ fn check(organs: &[&str], preset: PresetName, mode: TissueMode, least: [f32; 2])
         }
         let mesh = load_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
         let mut preset = preset.load();
-        preset.tissue.mode = mode;
-        let tissue = preset.tissue.build(&mesh).unwrap_or_else(|error| panic!("{name}: {error}"));
+        preset.tissue = mode.into();
+        let data = SourceData { mesh: Some(Arc::new(mesh)), ..SourceData::default() };
+        let prepared = preset.tissue.prepare(&data).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let tissue = prepared.tissue();
         let generator = preset.generator_for(tissue.extent());
         let settings = generator.colonization().expect("presets colonize");
         let octants = octants(tissue.at_step(settings.steps));
         for seed in 0..SEEDS {
-            let mut growth = Colonization::new(Arc::clone(&tissue), settings.clone(), &preset.roots(), seed)
+            let mut growth = Colonization::new(Arc::clone(tissue), settings.clone(), &preset.roots(), seed)
                 .unwrap_or_else(|error| panic!("{name}: {error}"));
             growth.run();
             let shares = Colonization::KINDS.map(|kind| worst(&growth, &octants, kind));

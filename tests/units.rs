@@ -7,15 +7,14 @@ use bevy_vessels::synthesis::{
     colonization::{Colonization, ColonizationSettings},
     mesh::TriangleMesh,
     roots::Roots,
-    tissue::{TissueMode, TissueSettings},
-    tree::VesselKind,
+    tissue::{MeshTissue, TissueMode},
 };
 
 /// An organ of a unit's size, larger by a factor.
 fn grown(mesh: &TriangleMesh, factor: f32, mode: TissueMode, seed: u64) -> Colonization {
     let positions = mesh.positions().iter().map(|&position| position * factor).collect();
     let mesh = TriangleMesh::new(positions, mesh.triangles().to_vec(), None).expect("a mesh");
-    let tissue = TissueSettings { mode, resolution: 48, ..TissueSettings::default() }.build(&mesh).expect("a tissue");
+    let tissue = MeshTissue { mode, resolution: 48 }.prepare(mesh).expect("a tissue").tissue().clone();
     let settings = ColonizationSettings::default().fit(tissue.extent());
     let mut growth = Colonization::new(tissue, settings, &Roots::default(), seed).expect("a growth");
     growth.run();

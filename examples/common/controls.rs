@@ -5,7 +5,7 @@ use super::{
     studio::{StatusLine, View},
 };
 use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, light::NotShadowCaster, prelude::*};
-use bevy_vessels::{prelude::*, synthesis::tree::VesselKind};
+use bevy_vessels::prelude::*;
 
 /// What the keys of [`ControlsPlugin`] do.
 pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours";
@@ -68,10 +68,9 @@ fn steer(
 }
 
 fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>) {
-    for (key, system) in [(KeyCode::KeyA, VesselKind::Artery), (KeyCode::KeyV, VesselKind::Vein)] {
+    for (key, kind) in [(KeyCode::KeyA, VesselKind::Artery), (KeyCode::KeyV, VesselKind::Vein)] {
         for mut look in looks.iter_mut().filter(|_| keys.just_pressed(key)) {
-            let shown = look.shows(system);
-            look.set_shown(system, !shown);
+            look.shown[kind] = !look.shown[kind];
         }
     }
     for mut look in looks.iter_mut().filter(|_| keys.just_pressed(KeyCode::KeyC)) {
@@ -92,7 +91,7 @@ pub fn tell(
     mut status: ResMut<StatusLine>,
 ) {
     let Some((vasculature, first, control)) = organs.iter().next() else { return };
-    let nodes: usize = organs.iter().flat_map(|(_, progress, _)| progress.nodes).sum();
+    let nodes: usize = organs.iter().flat_map(|(_, progress, _)| progress.nodes.values()).sum();
     let paused = if *control == GrowthControl::Paused { ", paused" } else { "" };
     let fps = diagnostics.get(&FrameTimeDiagnosticsPlugin::FPS).and_then(|fps| fps.smoothed()).unwrap_or_default();
     status.0 = format!(

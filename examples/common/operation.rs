@@ -17,7 +17,7 @@ use bevy_vessels::{
     synthesis::{
         io::write_atomically,
         organ::Viewpoint,
-        tree::{NodeId, Place, VesselKind, VesselTree},
+        tree::{NodeId, Place, VesselTree},
         wound::EndSide,
     },
 };
@@ -133,22 +133,22 @@ fn above(tree: &VesselTree, node: NodeId, passes: impl Fn(NodeId) -> bool) -> Op
 #[derive(SystemParam)]
 struct Patient<'w, 's> {
     ends: Query<'w, 's, (&'static OpenEnd, &'static GlobalTransform)>,
-    vessels: Query<'w, 's, (&'static &'static Vessels, &'static GlobalTransform)>,
+    vessels: Query<'w, 's, (&'static Vessels, &'static GlobalTransform)>,
     blood: Query<'w, 's, (&'static CirculationState, &'static OrganSupply)>,
 }
 
 impl Patient<'_, '_> {
     /// Where to operate.
     fn site(&self, surface: &Surface) -> Option<Site> {
-        let arteries = self.vessels.iter().filter(|(system, ..)| system.0 == VesselKind::Artery);
-        arteries.filter_map(|(_, vessels, place)| Site::find(vessels, place, surface)).next()
+        let arteries = self.vessels.iter().filter(|(vessels, _)| vessels.kind() == VesselKind::Artery);
+        arteries.filter_map(|(vessels, place)| Site::find(vessels, place, surface)).next()
     }
 
     /// Where the artery that has lost most is to be clamped: on the way from its root to its end, a little before that.
     fn feeds_most(&self) -> Option<(Entity, Place)> {
-        let fed = self.ends.iter().filter(|(end, _)| (end.system, end.side) == (VesselKind::Artery, EndSide::Proximal));
+        let fed = self.ends.iter().filter(|(end, _)| (end.kind, end.side) == (VesselKind::Artery, EndSide::Proximal));
         let (end, tip) = fed.max_by(|(a, _), (b, _)| a.lost.ml().total_cmp(&b.lost.ml()))?;
-        let (_, vessels, to_world) = self.vessels.get(end.vessels).ok()?;
+        let (vessels, to_world) = self.vessels.get(end.vessels).ok()?;
         let tree = vessels.tree();
         let is_above = |node: NodeId| {
             let at = to_world.transform_point(tree.positions()[node.index()]);

@@ -8,7 +8,7 @@ use bevy::{
     mesh::{Indices, PrimitiveTopology},
     prelude::*,
 };
-use bevy_vessels::{plugin::read_mesh, synthesis::mesh::TriangleMesh};
+use bevy_vessels::{plugin::triangle_mesh, synthesis::mesh::TriangleMesh};
 use std::path::PathBuf;
 
 /// Loads an organ's file when there is an [`OrganFile`], and triggers [`OrganLoaded`]. A file that is no organ ends the app.
@@ -95,7 +95,7 @@ impl Files<'_> {
         let mesh = node.mesh.as_ref().and_then(|mesh| self.parts.get(mesh));
         for primitive in mesh.iter().flat_map(|mesh| &mesh.primitives) {
             if let Some(mesh) = self.meshes.get(&primitive.mesh) {
-                all.add(&read_mesh(mesh)?, place);
+                all.add(&triangle_mesh(mesh)?, place);
             }
         }
         node.children.iter().try_for_each(|child| self.collect(child, place, all))

@@ -11,6 +11,7 @@ use bevy::{
     render::view::screenshot::{Screenshot, ScreenshotCaptured},
 };
 use bevy_vessels::{
+    plugin::OrganVessels,
     prelude::*,
     synthesis::{
         io::{SwcOptions, save_swc},
@@ -86,7 +87,7 @@ fn give_up(mut failures: MessageReader<GrowthFailed>, mut exit: MessageWriter<Ap
 fn grow(
     args: Res<StudioArgs>,
     time: Res<Time<Real>>,
-    organs: Query<(Entity, &Vasculature, &GrowthProgress)>,
+    organs: Query<(Entity, &GrowthProgress)>,
     mut session: ResMut<Session>,
     mut budget: ResMut<GrowthBudget>,
     mut commands: MessageWriter<GrowthCommand>,
@@ -94,7 +95,7 @@ fn grow(
     if organs.is_empty() {
         return;
     }
-    let steps: u32 = organs.iter().map(|(_, vasculature, _)| vasculature.settings.steps).sum();
+    let steps: u32 = organs.iter().map(|(_, progress)| progress.steps).sum();
     budget.set_if_neq(GrowthBudget::Steps(steps.div_ceil(args.frames)));
     if organs.iter().any(|(.., progress)| progress.step > 0) {
         session.frame_times.push(time.delta());
@@ -176,14 +177,14 @@ fn smaller(image: &Image) -> io::Result<Image> {
 #[derive(bevy::ecs::system::SystemParam)]
 struct Networks<'w, 's> {
     organs: Query<'w, 's, (NameOrEntity, &'static GrowthProgress, Option<&'static OrganVessels>)>,
-    vessels: Query<'w, 's, (&'static &'static Vessels)>,
+    vessels: Query<'w, 's, &'static Vessels>,
 }
 
 impl Networks<'_, '_> {
     fn write(&self, args: &StudioArgs) {
         for (name, _, vessels) in &self.organs {
-            for (system, vessels) in self.vessels.iter_many(vessels.map_or(&[][..], OrganVessels::entities)) {
-                let path = args.out.join(format!("{name}_{}.swc", system.0.name()));
+            for vessels in self.vessels.iter_many(vessels.map_or(&[][..], OrganVessels::entities)) {
+                let path = args.out.join(format!("{name}_{}.swc", vessels.kind().name()));
                 let written = std::fs::create_dir_all(&args.out).map_err(|error| error.to_string()).and_then(|()| {
                     save_swc(&path, vessels.tree(), &SwcOptions::default()).map_err(|error| error.to_string())
                 });
@@ -197,7 +198,7 @@ impl Networks<'_, '_> {
 
     fn print_figures(&self, frame_times: &mut [Duration]) {
         for (name, progress, _) in &self.organs {
-            let [arterial, venous] = progress.nodes;
+            let (arterial, venous) = (progress.nodes.artery, progress.nodes.vein);
             let ms = progress.grow_time.as_secs_f64() * 1000.0;
             println!("{name}: {} steps, {arterial} + {venous} nodes, grown in {ms:.0} ms", progress.step);
         }

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_vessels::{
-    plugin::read_mesh,
+    plugin::triangle_mesh,
     synthesis::mesh::{SurfacePoint, TriangleIndex, TriangleMesh},
 };
 
@@ -26,7 +26,7 @@ pub struct Surface {
 impl Surface {
     /// The surface of a mesh at a place, looked at from somewhere.
     pub fn new(mesh: &Mesh, place: &Transform, eye: Vec3) -> Result<Self> {
-        let mesh = read_mesh(mesh)?;
+        let mesh = triangle_mesh(mesh)?;
         let positions = mesh.positions().iter().map(|&at| place.transform_point(at)).collect();
         let mesh = TriangleMesh::new(positions, mesh.triangles().to_vec(), None)?;
         let bounds = mesh.bounds();

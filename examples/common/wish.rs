@@ -2,10 +2,7 @@
 
 use crate::common::studio::StudioArgs;
 use bevy::prelude::*;
-use bevy_vessels::{
-    prelude::*,
-    synthesis::{organ::RootSites, tree::VesselKind},
-};
+use bevy_vessels::{prelude::*, synthesis::organ::RootSites};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -47,16 +44,19 @@ impl OrganArgs {
     /// The vessels, with their radii multiplied so that they show from afar, or are fine from near.
     pub fn vessels(&self, roots: Option<&RootSites>, radii: f32) -> Vasculature {
         let mut wish = Vasculature::new(self.preset).with_seed(self.seed);
+        let settings = wish.generator.colonization_mut().expect("presets colonize");
+        settings.arterial.terminal_radius *= radii;
+        settings.venous.terminal_radius *= radii;
         wish.tissue.mode = match self.mode {
             Mode::Surface => TissueMode::Surface,
             Mode::Volume => TissueMode::Volume,
-            Mode::Staged => TissueMode::Staged { surface_steps: wish.settings.steps / 2 },
+            Mode::Staged => TissueMode::Staged { surface_steps: settings.steps / 2 },
         };
-        for system in VesselKind::ALL {
-            wish.settings.system_mut(system).terminal_radius *= radii;
+        if let Some(roots) = roots {
+            wish.roots.artery = RootPlacement::Nearest(roots.arterial.clone());
+            wish.roots.vein = RootPlacement::Nearest(roots.venous.clone());
         }
-        let Some(roots) = roots else { return wish };
-        wish.with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()))
+        wish
     }
 
     /// The tint of the organ: glass, where vessels grow inside.

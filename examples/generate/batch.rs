@@ -3,10 +3,14 @@
 use super::organ::Grower;
 use super::report::Line;
 use super::{Failure, Job};
+use bevy_vessels::synthesis::growth::StepCount;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc;
+
+/// Parts of an organ that the progress bar shows.
+const PARTS: u64 = 1000;
 
 /// Grows organs 0 to `organs` − 1, of the seeds that `seed_of` gives them, and hands each line to `report`, in order.
 ///
@@ -18,7 +22,7 @@ pub fn grow_all(
     threads: usize,
     mut report: impl FnMut(&Line) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let bar = progress_bar(organs.saturating_mul(job.settings.steps.into()));
+    let bar = progress_bar(organs.saturating_mul(PARTS));
     let workers = threads.min(usize::try_from(organs).unwrap_or(usize::MAX));
     let next = AtomicU64::new(0);
     let result = std::thread::scope(|scope| {
@@ -31,9 +35,12 @@ pub fn grow_all(
                     let mut grower = Grower::new(job);
                     loop {
                         let organ = next.fetch_add(1, Ordering::Relaxed);
+                        if organ >= organs {
+                            break;
+                        }
+                        let line = grower.grow(seed_of(organ), show_progress(bar));
                         // Nobody listens any more once the batch has failed.
-                        if organ >= organs || sender.send((organ, grower.grow(seed_of(organ), || bar.inc(1)))).is_err()
-                        {
+                        if sender.send((organ, line)).is_err() {
                             break;
                         }
                     }
@@ -82,9 +89,19 @@ fn with_threads(_threads: usize, work: impl FnOnce()) {
     work();
 }
 
+/// Moves the bar on by the share of one organ's steps that is done.
+fn show_progress(bar: &ProgressBar) -> impl FnMut(StepCount) {
+    let mut shown = 0;
+    move |steps| {
+        let now = PARTS * u64::from(steps.done) / u64::from(steps.all.max(1));
+        bar.inc(now - shown);
+        shown = now;
+    }
+}
+
 /// A bar on standard error, drawn only where that is a terminal.
-fn progress_bar(steps: u64) -> ProgressBar {
-    let bar = ProgressBar::new(steps);
+fn progress_bar(parts: u64) -> ProgressBar {
+    let bar = ProgressBar::new(parts);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} + {eta} left") {
         bar.set_style(style);
     }

@@ -8,6 +8,7 @@ mod report;
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::ColonizationSettings,
+    generator::Generator,
     io::{MeshReadError, load_mesh},
     preset::{Preset, PresetName},
     roots::RootPlacement,
@@ -115,7 +116,7 @@ impl Mode {
 /// A format of files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub enum Format {
-    /// Nodes and radii, a file per system.
+    /// Nodes and radii, a file for each kind of vessels.
     Swc,
     /// A surface to look at.
     Obj,
@@ -155,7 +156,8 @@ impl Failure {
 /// Everything that the organs of a batch have in common.
 struct Job {
     tissue: Arc<dyn Tissue>,
-    settings: ColonizationSettings,
+    /// Fitted to the tissue.
+    generator: Generator,
     preset: Preset,
     tissue_name: String,
     preset_name: String,
@@ -184,17 +186,21 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
     for change in &options.set {
         preset = edit::apply(&preset, change).map_err(|error| Failure::Usage(format!("--set {change}: {error}")))?;
     }
-    preset.settings.steps = options.steps.unwrap_or(preset.settings.steps);
-    preset.settings.samples = options.samples.unwrap_or(preset.settings.samples);
+    if let Some(steps) = options.steps {
+        colonization(&mut preset, "--steps")?.steps = steps;
+    }
+    if let Some(samples) = options.samples {
+        colonization(&mut preset, "--samples")?.samples = samples;
+    }
     if options.no_veins {
-        preset.venous_roots = RootPlacement::None;
+        preset.roots.vein = RootPlacement::None;
     }
     if !(options.lengths.is_finite() && options.lengths > 0.0) {
         return Err(Failure::Usage(format!("--lengths is {}; it must be finite and above 0", options.lengths)));
     }
     let tissue = build_tissue(options, &mut preset)?;
-    let settings = preset.settings_for(tissue.extent()).scaled(options.lengths);
-    for warning in settings.validate().map_err(Failure::usage)? {
+    let generator = preset.generator_for(tissue.extent()).scaled(options.lengths);
+    for warning in generator.validate().map_err(Failure::usage)? {
         eprintln!("generate: warning: {warning}");
     }
     if let Some(folder) = &options.out {
@@ -205,7 +211,13 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
     formats.sort();
     formats.dedup();
     let tissue_name = options.tissue.display().to_string();
-    Ok(Job { tissue, settings, preset, tissue_name, preset_name, out: options.out.clone(), formats })
+    Ok(Job { tissue, generator, preset, tissue_name, preset_name, out: options.out.clone(), formats })
+}
+
+/// The settings that an option changes.
+fn colonization<'a>(preset: &'a mut Preset, option: &str) -> Result<&'a mut ColonizationSettings, Failure> {
+    let settings = preset.generator.colonization_mut();
+    settings.ok_or_else(|| Failure::Usage(format!("{option} is for space colonization; the preset grows otherwise")))
 }
 
 fn read_preset(options: &Options) -> Result<(Preset, String), Failure> {
@@ -233,9 +245,10 @@ fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue
         (Some(shape), None) => Ok(shape),
         (None, mode) => {
             if let Some(mode) = mode {
-                preset.tissue.mode = mode.tissue_mode(preset.tissue.mode, preset.settings.steps);
+                let steps = colonization(preset, "--mode")?.steps;
+                preset.tissue.mode = mode.tissue_mode(preset.tissue.mode, steps);
             }
-            let mesh = read_mesh(&options.tissue).map_err(|error| match error {
+            let mesh = load_mesh(&options.tissue).map_err(|error| match error {
                 MeshReadError::UnknownFormat { path } => Failure::Usage(format!(
                     "--tissue is {}; it must be disc, ball, box, or a file that ends in .glb, .gltf or .obj",
                     path.display()

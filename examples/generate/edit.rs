@@ -6,7 +6,7 @@ use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use std::fmt;
 
 /// Where a key is looked for when the preset itself does not have it, so that `steps=50` is enough.
-const INNER: &str = "settings";
+const INNER: &str = "generator";
 
 /// The preset with one value changed.
 pub fn apply(preset: &Preset, change: &str) -> Result<Preset, String> {
@@ -34,12 +34,13 @@ fn shortened(text: &str) -> String {
     if shown.len() < line.len() { shown + " …" } else { line }
 }
 
-/// RON of a struct with the value at a path replaced, and the value that was there.
+/// RON of a struct, or of a variant that holds one, with the value at a path replaced; and the value that was there.
 fn replace(text: &str, path: &[&str], value: &str, within: Option<&str>) -> Result<(String, String), String> {
     let [key, rest @ ..] = path else {
         return Ok((value.to_owned(), text.to_owned()));
     };
-    let mut fields = Fields::of(text).map_err(|_| format!("{} has no fields", within.unwrap_or("a preset")))?;
+    let variant = Variant::of(text);
+    let mut fields = Fields::of(variant.held).map_err(|_| format!("{} has no fields", within.unwrap_or("a preset")))?;
     let names: Vec<String> = fields.names().map(str::to_owned).collect();
     let Some((_, field)) = fields.0.iter_mut().find(|(name, _)| name == key) else {
         return Err(format!("no setting {key:?} in {}; there are {}", within.unwrap_or(INNER), names.join(", ")));
@@ -47,7 +48,30 @@ fn replace(text: &str, path: &[&str], value: &str, within: Option<&str>) -> Resu
     let (changed, before) = replace(field, rest, value, Some(key))?;
     *field = changed;
     let fields: Vec<String> = fields.0.into_iter().map(|(name, value)| format!("{name}: {value}")).collect();
-    Ok((format!("({})", fields.join(", ")), before))
+    Ok((format!("{}({}){}", variant.before, fields.join(", "), variant.after), before))
+}
+
+/// RON of a struct, and what stands around it where it is held by a variant of an enum.
+struct Variant<'a> {
+    before: &'a str,
+    held: &'a str,
+    after: &'a str,
+}
+
+impl<'a> Variant<'a> {
+    /// Looks into `Name((field: …))` and `Name(field: …)`. Anything else is itself what is held.
+    fn of(text: &'a str) -> Self {
+        let name = text.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(0);
+        let (name, held) = text.split_at(name);
+        let inner = held.strip_prefix('(').and_then(|rest| rest.strip_suffix(')')).unwrap_or(held);
+        match inner.trim() {
+            inner if !name.is_empty() && inner.starts_with('(') && inner.ends_with(')') => {
+                let start = text.len() - held.len() + 1;
+                Self { before: &text[..start], held: inner, after: ")" }
+            }
+            _ => Self { before: name, held, after: "" },
+        }
+    }
 }
 
 /// Names and RON of a struct's fields, whatever the struct.

@@ -1,10 +1,10 @@
 //! One organ: grown, measured, written.
 
-use super::report::{Line, Measures};
+use super::report::{KindMeasures, Line};
 use super::{Failure, Format, Job};
 use bevy_vessels::synthesis::{
-    colonization::Colonization,
-    io::{ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc},
+    growth::{Growth, StepCount},
+    io::{ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc, swc_structure},
     roots::Roots,
     tree::{VesselKind, VesselTree, hash_trees},
 };
@@ -16,7 +16,7 @@ use std::time::Instant;
 pub struct Grower<'a> {
     job: &'a Job,
     roots: Roots,
-    growth: Option<Colonization>,
+    growth: Option<Box<dyn Growth>>,
 }
 
 impl<'a> Grower<'a> {
@@ -26,43 +26,45 @@ impl<'a> Grower<'a> {
     }
 
     /// Grows the organ of a seed, calling `after_step` after each step, and writes its files.
-    pub fn grow(&mut self, seed: u64, after_step: impl Fn()) -> Result<Line, Failure> {
+    pub fn grow(&mut self, seed: u64, mut after_step: impl FnMut(StepCount)) -> Result<Line, Failure> {
         let named = |error| Failure::Run(format!("{} with seed {seed}: {error}", self.job.tissue_name));
-        let settings = self.job.settings.clone();
+        let (generator, tissue) = (&self.job.generator, Arc::clone(&self.job.tissue));
         let growth = match self.growth.take() {
-            Some(mut growth) => growth.restart(settings, &self.roots, seed).map(|()| growth),
-            None => Colonization::new(Arc::clone(&self.job.tissue), settings, &self.roots, seed),
+            Some(growth) => generator.restart(growth, tissue, &self.roots, seed),
+            None => generator.start(tissue, &self.roots, seed),
         };
-        let growth = self.growth.insert(growth.map_err(named)?);
+        let growth = self.growth.insert(growth.map_err(named)?).as_mut();
         let start = Instant::now();
         while !growth.is_finished() {
-            growth.step();
-            after_step();
+            growth.advance();
+            after_step(growth.progress());
         }
+        growth.settle();
         let grow_ms = 1e3 * start.elapsed().as_secs_f64();
-        let hash = hash_trees(VesselKind::ALL.map(|system| growth.tree(system)));
+        let hash = hash_trees(growth.trees().values().flatten().map(|grown| grown.tree));
         Ok(Line {
             tissue: self.job.tissue_name.clone(),
             preset: self.job.preset_name.clone(),
             seed,
-            steps: growth.steps_done(),
+            steps: growth.progress().done,
             grow_ms: (grow_ms * 1e3).round() / 1e3,
             hash: format!("{hash:016x}"),
-            arterial: Measures::of(growth, VesselKind::Artery, seed),
-            venous: Measures::of(growth, VesselKind::Vein, seed),
+            kinds: KindMeasures::of(growth, &*self.job.tissue, seed),
             files: write_files(self.job, growth, seed, hash)?,
         })
     }
 }
 
 /// Writes the vessels as they are drawn, and gives the files' paths.
-fn write_files(job: &Job, growth: &Colonization, seed: u64, hash: u64) -> Result<Vec<String>, Failure> {
+fn write_files(job: &Job, growth: &dyn Growth, seed: u64, hash: u64) -> Result<Vec<String>, Failure> {
     let Some(folder) = &job.out else {
         return Ok(Vec::new());
     };
-    let vessels = VesselKind::ALL.map(|system| (system, growth.vessels(system)));
-    let trees: Vec<(VesselKind, &VesselTree)> =
-        vessels.iter().map(|(system, tree)| (*system, tree)).filter(|(_, tree)| !tree.is_empty()).collect();
+    let vessels = growth.trees().map(|_, grown| grown.map(|grown| grown.vessels()));
+    let trees: Vec<(VesselKind, &VesselTree)> = vessels
+        .iter()
+        .filter_map(|(kind, tree)| Some((kind, tree.as_ref().filter(|tree| !tree.is_empty())?)))
+        .collect();
     let stem = format!("{}_{}_{seed}", file_name(&tissue_stem(job)), file_name(&job.preset_name));
     let mut files = Vec::new();
     let mut save = |name: String, save: &dyn Fn(&Path) -> Result<(), WriteError>| {
@@ -73,9 +75,10 @@ fn write_files(job: &Job, growth: &Colonization, seed: u64, hash: u64) -> Result
     for format in &job.formats {
         match format {
             Format::Swc => {
-                for &(system, tree) in &trees {
-                    let options = SwcOptions { comments: comments(job, system, seed, hash), structure: 0 };
-                    save(format!("{stem}_{}.swc", system.name()), &|path| save_swc(path, tree, &options))?;
+                for &(kind, tree) in &trees {
+                    let options =
+                        SwcOptions { comments: comments(job, kind, seed, hash), structure: swc_structure(kind) };
+                    save(format!("{stem}_{}.swc", kind.name()), &|path| save_swc(path, tree, &options))?;
                 }
             }
             Format::Obj => save(format!("{stem}.obj"), &|path| save_obj(path, &trees, &ObjOptions::default()))?,
@@ -86,10 +89,10 @@ fn write_files(job: &Job, growth: &Colonization, seed: u64, hash: u64) -> Result
 }
 
 /// What it takes to grow a file's vessels again.
-fn comments(job: &Job, system: VesselKind, seed: u64, hash: u64) -> Vec<String> {
+fn comments(job: &Job, kind: VesselKind, seed: u64, hash: u64) -> Vec<String> {
     vec![
-        format!("{} vessels of {}, preset {}, seed {seed}", system.name(), job.tissue_name, job.preset_name),
-        format!("both systems' hash: {hash:016x}"),
+        format!("{} vessels of {}, preset {}, seed {seed}", kind.name(), job.tissue_name, job.preset_name),
+        format!("hash of all kinds of vessels: {hash:016x}"),
         "unit: that of the tissue".into(),
     ]
 }

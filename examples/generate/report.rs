@@ -2,11 +2,12 @@
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    colonization::Colonization,
+    growth::{GrownTree, Growth},
     random::Stream,
-    tree::{VesselKind, statistics},
+    tissue::Tissue,
+    tree::{ByKind, statistics},
 };
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Points drawn from the tissue to measure coverage: its standard error is below 0.4 %.
 const COVERAGE_SAMPLES: usize = 20_000;
@@ -24,12 +25,11 @@ pub struct Line {
     pub steps: u32,
     /// Wall time of the growth alone, in milliseconds.
     pub grow_ms: f64,
-    /// Hash of both centre-line trees.
+    /// Hash of all centre-line trees.
     pub hash: String,
-    /// The arteries.
-    pub arterial: Measures,
-    /// The veins.
-    pub venous: Measures,
+    /// Each kind of vessels, under its name: `arterial`, `venous`, `portal`, `ductal`.
+    #[serde(flatten)]
+    pub kinds: KindMeasures,
     /// Files that were written.
     pub files: Vec<String>,
 }
@@ -43,14 +43,36 @@ impl Line {
 
     /// The line for people.
     pub fn text(&self) -> String {
-        let [arteries, veins] =
-            [&self.arterial, &self.venous].map(|m| format!("{} nodes, {} leaves", m.nodes, m.leaves));
         let Self { tissue, preset, seed, grow_ms, hash, .. } = self;
-        format!("{tissue} {preset} seed {seed}: arteries {arteries}; veins {veins}; {grow_ms:.1} ms; {hash}")
+        let kinds = self.kinds.0.iter().filter_map(|(kind, measures)| {
+            let Measures { nodes, leaves, .. } = measures.as_ref()?;
+            Some(format!("{} {nodes} nodes, {leaves} leaves; ", kind.plural().to_lowercase()))
+        });
+        format!("{tissue} {preset} seed {seed}: {}{grow_ms:.1} ms; {hash}", kinds.collect::<String>())
     }
 }
 
-/// Statistics of one system's centre lines. What a tree does not have is null.
+/// Measures of each kind of vessels that the generator grows.
+#[derive(Debug)]
+pub struct KindMeasures(ByKind<Option<Measures>>);
+
+impl KindMeasures {
+    /// Measures the vessels of a finished growth.
+    pub fn of(growth: &dyn Growth, tissue: &dyn Tissue, seed: u64) -> Self {
+        let mut rng = Stream::Statistics.rng(seed);
+        let supplied = tissue.at_step(growth.progress().done);
+        let samples: Vec<Vec3> = (0..COVERAGE_SAMPLES).filter_map(|_| supplied.sample(&mut rng)).collect();
+        Self(growth.trees().map(|_, grown| grown.map(|grown| Measures::of(grown, tissue, &samples))))
+    }
+}
+
+impl Serialize for KindMeasures {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().filter_map(|(kind, measures)| Some((kind.name(), measures.as_ref()?))))
+    }
+}
+
+/// Statistics of the centre lines of one kind. What a tree does not have is null.
 #[derive(Debug, Serialize)]
 pub struct Measures {
     nodes: usize,
@@ -69,17 +91,11 @@ pub struct Measures {
 }
 
 impl Measures {
-    /// Measures a system of a finished growth.
+    /// Measures the vessels of one kind.
     ///
-    /// The terminal radius is the median over the leaves. Coverage is the share of the tissue within the last birth
-    /// distance of a node.
-    pub fn of(growth: &Colonization, system: VesselKind, seed: u64) -> Self {
-        let tree = growth.tree(system);
+    /// The terminal radius is the median over the leaves. Coverage is the share of the samples that count as supplied.
+    fn of(GrownTree { tree, reach, .. }: GrownTree, tissue: &dyn Tissue, samples: &[Vec3]) -> Self {
         let measured = tree.statistics();
-        let tissue = growth.tissue().at_step(growth.steps_done());
-        let mut rng = Stream::Statistics.rng(seed);
-        let samples: Vec<Vec3> = (0..COVERAGE_SAMPLES).filter_map(|_| tissue.sample(&mut rng)).collect();
-        let reach = growth.settings().system(system).node_birth_distance * growth.length_scale(system);
         Self {
             nodes: measured.nodes,
             leaves: measured.leaves,
@@ -92,8 +108,8 @@ impl Measures {
             strahler_orders: measured.strahler_orders(),
             branching_ratio: measured.branching_ratio,
             tortuosity_median: measured.tortuosity.map(|tortuosity| tortuosity.median),
-            coverage: statistics::coverage(tree, &samples, reach),
-            outside: statistics::outside(tree, |node| growth.tissue().contains(node)),
+            coverage: statistics::coverage(tree, samples, reach),
+            outside: statistics::outside(tree, |node| tissue.contains(node)),
         }
     }
 }

@@ -27,7 +27,7 @@
 //!
 //! ```
 //! use bevy_vessels::synthesis::{
-//!     colonization::{ColonizationSettings, Growth},
+//!     colonization::{Colonization, ColonizationSettings},
 //!     io::{SwcOptions, save_swc},
 //!     roots::Roots,
 //!     tissue::{Disc, Tissue},
@@ -38,7 +38,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let tissue = Arc::new(Disc::flat(50.0)?);
 //! let settings = ColonizationSettings::default().fit(tissue.extent());
-//! let mut growth = Growth::new(tissue, settings, &Roots::default(), 7)?;
+//! let mut growth = Colonization::new(tissue, settings, &Roots::default(), 7)?;
 //! growth.run();
 //! let arteries = growth.vessels(VesselKind::Artery);
 //! println!("{} nodes, {} tips", arteries.len(), arteries.tips().len());

@@ -6,7 +6,7 @@
 
 use crate::synthesis::generator::{Generator, GeneratorError};
 use crate::synthesis::roots::{RootPlacements, Roots};
-use crate::synthesis::tissue::{Extent, TissueSettings};
+use crate::synthesis::tissue::{Extent, TissueSource};
 use std::fmt;
 use std::str::FromStr;
 
@@ -27,8 +27,10 @@ pub struct Preset {
     ///
     /// Default: true.
     pub fit: bool,
-    /// Where on an organ mesh vessels grow: over its surface, through its volume, or in stages.
-    pub tissue: TissueSettings,
+    /// Where the tissue comes from: an organ's mesh, over its surface, through its volume or in stages; a shape; an image.
+    ///
+    /// Default: the surface of the mesh.
+    pub tissue: TissueSource,
     /// Where vessels begin.
     pub roots: RootPlacements,
     /// What makes the vessels, with its settings.
@@ -43,7 +45,7 @@ impl Default for Preset {
             version: Self::VERSION,
             source: String::new(),
             fit: true,
-            tissue: TissueSettings::default(),
+            tissue: TissueSource::default(),
             roots: RootPlacements::default(),
             generator: Generator::default(),
         }

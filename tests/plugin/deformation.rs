@@ -203,7 +203,7 @@ fn solid_box(n: u32) -> TetMesh {
 /// Vessels through a box, which follow its tetrahedra.
 fn solid(app: &mut App) -> Entity {
     let mut vasculature = quick();
-    vasculature.tissue.mode = TissueMode::Volume;
+    vasculature.tissue = TissueMode::Volume.into();
     let mesh = add_mesh(app, Cuboid::from_length(1.0));
     let tetrahedra = FollowsTetrahedra::new(solid_box(4));
     let organ = app.world_mut().spawn((Mesh3d(mesh), vasculature, Cuttable::default(), tetrahedra)).id();

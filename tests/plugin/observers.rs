@@ -3,8 +3,8 @@
 use super::*;
 use bevy_vessels::{
     plugin::{
-        BleedingStarted, BleedingStopped, CirculationFailed, Cuttable, CuttableVessels, EntityCommandsExt, GrowthFailed, GrowthFinished,
-        GrowthStarted, OpenEnd, OpenEndEntities, Perfusion, VesselOperation,
+        BleedingStarted, BleedingStopped, CirculationFailed, Cuttable, CuttableVessels, EntityCommandsExt,
+        GrowthFailed, GrowthFinished, GrowthStarted, OpenEnd, OpenEndEntities, Perfusion, VesselOperation,
     },
     synthesis::{haemodynamics::BleedingSettings, roots::RootPlacements, units::Scale, wound::Blade},
 };
@@ -72,10 +72,10 @@ fn growth_is_heard_once_by_observers_of_the_organ_and_of_all() {
 fn a_failure_is_heard_on_its_organ_only() {
     let mut app = headless(GrowthBudget::default());
     let good = spawn(&mut app, quick());
-    let bad = spawn(&mut app, quick().with_roots(RootPlacements {
-        artery: RootPlacement::Exact(vec![Vec3::splat(99.0)]),
-        ..default()
-    }));
+    let bad = spawn(
+        &mut app,
+        quick().with_roots(RootPlacements { artery: RootPlacement::Exact(vec![Vec3::splat(99.0)]), ..default() }),
+    );
     listen::<GrowthFailed>(&mut app, good);
     run_to_phase(&mut app, bad, GrowthPhase::Failed);
     app.update();

@@ -116,7 +116,8 @@ fn settings_survive_a_file() {
 fn types_within_registered_types_are_registered() {
     let app = headless(GrowthBudget::default());
     let registry: &TypeRegistry = &app.world().resource::<AppTypeRegistry>().read();
-    for path in ["Preset", "Generator", "WoundReport", "SeveredEnd", "ByKind<Color>", "ByKind<Flow>", "Place", "EndId"] {
+    for path in ["Preset", "Generator", "WoundReport", "SeveredEnd", "ByKind<Color>", "ByKind<Flow>", "Place", "EndId"]
+    {
         assert!(registry.get_with_short_type_path(path).is_some(), "{path}");
     }
 }

@@ -300,7 +300,7 @@ fn given_vessels_come_back_with_their_wounds() {
     fresh.update();
     assert_eq!(condition(fresh.world(), loaded), before);
     assert_no_ghosts(fresh.world_mut(), &[loaded]);
-    // The same through a scene that was never text.
+    // A tree that was changed in the file is another one.
     let changed = scene.replace("0.05", "0.06");
     assert_ne!(changed, scene);
     let [other] = load(&mut fresh, &changed)[..] else { panic!("one organ") };

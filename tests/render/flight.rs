@@ -17,7 +17,6 @@ use bevy_vessels::{
         preset::PresetName,
         roots::RootPlacement,
         tissue::TissueMode,
-        tree::VesselKind,
     },
 };
 
@@ -38,12 +37,13 @@ fn spawn_colon(stage: &mut Stage) -> (Colon, Transform) {
     let scale = 1.0 / (high - low).max_element();
     let place = Transform::from_translation(-0.5 * (low + high) * scale).with_scale(Vec3::splat(scale));
     for (side, roots) in [(&colon.outer, &colon.roots), (&colon.inner, &colon.inner_roots)] {
-        let mut wish = Vasculature::new(PresetName::Colon)
-            .with_roots(RootPlacement::Nearest(roots.arterial.clone()), RootPlacement::Nearest(roots.venous.clone()));
-        wish.tissue.mode = TissueMode::Surface;
-        for system in VesselKind::ALL {
-            wish.settings.system_mut(system).terminal_radius *= 1.4;
-        }
+        let mut wish = Vasculature::new(PresetName::Colon);
+        wish.roots.artery = RootPlacement::Nearest(roots.arterial.clone());
+        wish.roots.vein = RootPlacement::Nearest(roots.venous.clone());
+        wish.tissue = TissueMode::Surface.into();
+        let settings = wish.generator.colonization_mut().expect("presets colonize");
+        settings.arterial.terminal_radius *= 1.4;
+        settings.venous.terminal_radius *= 1.4;
         let mesh: Mesh = colon.mesh.part(side.clone()).into();
         stage.spawn_organ(mesh, Color::srgb(0.8, 0.55, 0.5), (place, wish, VesselAppearance::default()));
     }

@@ -21,7 +21,7 @@ use bevy::{
 };
 use bevy_vessels::{
     VesselPlugin,
-    plugin::{SegmentChanges, SegmentColoring, VesselAppearance, Vessels, VesselsOf},
+    plugin::{ChangeLog, SegmentColoring, VesselAppearance, Vessels, VesselsOf},
     render::{SegmentBuffer, SegmentLimits, SegmentMaterial},
     synthesis::tree::{NO_PARENT, VesselKind, VesselTree},
 };
@@ -58,6 +58,12 @@ fn comb(count: usize) -> VesselTree {
         nodes.push(([x, 30.0, 0.0], 2 * tooth as u32, 2.0));
     }
     tree(&nodes)
+}
+
+/// The same tree elsewhere.
+fn moved(tree: &VesselTree, by: Vec3) -> VesselTree {
+    let positions = tree.positions().iter().map(|&at| at + by).collect();
+    VesselTree::from_arrays(positions, tree.parents().to_vec(), tree.radii().to_vec()).expect("a well-formed tree")
 }
 
 #[test]
@@ -137,7 +143,7 @@ fn growth_appears_through_range_writes_and_larger_buffers() {
         let organ = stage.spawn(VesselKind::Artery, &comb(2));
         let before = stage.picture();
         // half of the comb is one chunk, all of it two: the second picture needs a larger buffer and a new chunk
-        stage.replace(organ, &full, 4..full.len());
+        stage.change(organ, &full, 4..full.len());
         let after = stage.picture();
         assert_eq!(stage.chunks(organ).len(), 2);
         let [few, many] = [&before, &after].map(Picture::vessel_pixels);
@@ -154,8 +160,7 @@ fn only_marked_ranges_are_written_again() {
         let organ = stage.spawn(VesselKind::Artery, &comb(CHUNK));
         let before = stage.picture();
         // everything moved out of view, but only the second half was said to have changed
-        let gone = tree(&vec![([500.0, 0.0, 0.0], NO_PARENT, 1.0); 2 * CHUNK]);
-        stage.replace(organ, &gone, CHUNK..2 * CHUNK);
+        stage.change(organ, &moved(&comb(CHUNK), 500.0 * Vec3::X), CHUNK..2 * CHUNK);
         let after = stage.picture();
         assert!(before.is_vessel(64 - 40, 64) && before.is_vessel(64 + 40, 64));
         assert!(after.is_vessel(64 - 40, 64), "the first half is as it was");
@@ -168,11 +173,9 @@ fn scattered_changes_reach_their_slots_and_no_others() {
     on_stage("scattered", |stage| {
         let organ = stage.spawn(VesselKind::Artery, &comb(28));
         let before = stage.picture();
-        // all teeth but the first are moved out of view, and every third is said to have changed
-        let mut nodes = vec![([500.0, 0.0, 0.0], NO_PARENT, 2.0); 56];
-        (nodes[1].0, nodes[1].1) = ([500.0, 9.0, 0.0], 0);
-        let changed: Vec<usize> = (0..28).filter(|tooth| tooth % 3 == 1).flat_map(|t| [2 * t, 2 * t + 1]).collect();
-        stage.replace_nodes(organ, &tree(&nodes), &changed);
+        // all teeth are moved out of view, and every third is said to have changed
+        let changed = (0..28).filter(|tooth| tooth % 3 == 1).flat_map(|t| [2 * t, 2 * t + 1]);
+        stage.change(organ, &moved(&comb(28), 500.0 * Vec3::X), changed);
         let after = stage.picture();
         for tooth in 0..28 {
             let x = (64.0 - 56.0 + 112.0 * tooth as f32 / 27.0) as usize;
@@ -187,12 +190,12 @@ fn a_restart_clears_what_was_there() {
     on_stage("restart", |stage| {
         let organ = stage.spawn(VesselKind::Artery, &comb(CHUNK));
         stage.picture();
-        stage.replace(organ, &bar(), 0..2);
+        stage.replace(organ, &bar());
         let picture = stage.picture();
         assert!(picture.is_vessel(64, 64));
         assert!(picture.is_background(64, 64 - 20) && picture.is_background(64 + 40, 64), "stale segments");
         assert_eq!(stage.chunks(organ).len(), 1);
-        stage.replace(organ, &VesselTree::new(), 0..0);
+        stage.replace(organ, &VesselTree::new());
         assert_eq!(stage.picture().vessel_pixels(), 0);
         assert!(stage.chunks(organ).is_empty());
     });
@@ -225,17 +228,17 @@ fn losing_the_vessels_alone_removes_the_drawing() {
 }
 
 #[test]
-fn systems_have_their_colours_and_can_be_hidden() {
-    on_stage("systems", |stage| {
+fn kinds_have_their_colours_and_can_be_hidden() {
+    on_stage("kinds", |stage| {
         let organ = stage.spawn(VesselKind::Vein, &bar());
         let vein = stage.picture();
         assert!(vein.is_blue(64, 64), "{:?}", vein.at(64, 64));
-        stage.appearance(organ, |look| look.venous = Color::srgb(0.1, 0.6, 0.1));
+        stage.appearance(organ, |look| look.colors.vein = Color::srgb(0.1, 0.6, 0.1));
         let [r, g, b] = stage.picture().at(64, 64);
         assert!(g > r && g > b, "the new colour is there at the next frame");
-        stage.appearance(organ, |look| look.show_venous = false);
+        stage.appearance(organ, |look| look.shown.vein = false);
         assert_eq!(stage.picture().vessel_pixels(), 0);
-        stage.appearance(organ, |look| look.show_venous = true);
+        stage.appearance(organ, |look| look.shown.vein = true);
         assert!(stage.picture().is_vessel(64, 64));
     });
 }
@@ -319,11 +322,11 @@ fn boxes_follow_growth_so_that_nothing_in_view_is_culled() {
         assert_eq!(stage.visible_chunks(), 0, "what is out of view is culled");
         let mut grown = far.to_vec();
         grown.extend([([-10.0, 0.0, 0.0], NO_PARENT, 8.0), ([10.0, 0.0, 0.0], 2, 8.0)]);
-        stage.replace(organ, &tree(&grown), 2..4);
+        stage.change(organ, &tree(&grown), 2..4);
         assert!(stage.picture().is_vessel(64, 64));
         // beyond the node itself by its radius: a segment whose axis is out of view, but whose side is in
         let beside = [([-30.0, 74.0, 0.0], NO_PARENT, 20.0), ([30.0, 74.0, 0.0], 0, 20.0)];
-        stage.replace(organ, &tree(&beside), 0..2);
+        stage.replace(organ, &tree(&beside));
         assert!(stage.picture().is_vessel(64, 3), "a vessel's side at the edge of the picture");
     });
 }
@@ -336,9 +339,10 @@ fn nothing_is_done_when_nothing_changed() {
         let vessels = stage.vessels(organ);
         let world = stage.app.world();
         let changed = world.entity(vessels).get_ref::<SegmentBuffer>().expect("drawn").last_changed();
-        assert!(world.entity(vessels).get::<SegmentChanges>().expect("required").is_empty(), "changes were taken");
+        let seen = world.entity(vessels).get::<ChangeLog>().expect("required").now();
         stage.app.update();
         let world = stage.app.world();
+        assert!(seen.is_current(world.entity(vessels).get::<ChangeLog>().expect("required")), "nothing is marked");
         let buffer = world.entity(vessels).get_ref::<SegmentBuffer>().expect("drawn");
         assert_eq!(buffer.last_changed().get(), changed.get(), "an idle frame touches the buffer");
     });
@@ -366,9 +370,8 @@ fn without_a_renderer_vessels_are_kept_and_nothing_is_drawn() {
     app.finish();
     app.cleanup();
     let organ = app.world_mut().spawn((Transform::default(), Visibility::default(), VesselAppearance::default())).id();
-    let tree = Vessels::from_tree(&bar(), &[]);
-    let vessels =
-        app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(VesselKind::Artery), tree)).id();
+    let vessels = Vessels::from_tree(VesselKind::Artery, &bar(), &[]);
+    let vessels = app.world_mut().spawn((ChildOf(organ), VesselsOf(organ), vessels)).id();
     app.update();
     app.update();
     assert!(app.world().get::<SegmentBuffer>(vessels).is_none());

@@ -19,13 +19,12 @@ use bevy::{
 };
 use bevy_vessels::{
     VesselPlugin,
-    plugin::{EntityCommandsExt, OrganVessels, SegmentChanges, VesselAppearance, Vessels, VesselsOf},
+    plugin::{ChangeLog, EntityCommandsExt, OrganVessels, VesselAppearance, Vessels, VesselsOf},
     render::{SegmentBuffer, SegmentChunk, SegmentMaterial},
-    synthesis::tree::{VesselKind, VesselTree},
+    synthesis::tree::{ByKind, VesselKind, VesselTree},
 };
 use std::{
     any::Any,
-    ops::Range,
     panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     path::Path,
     sync::{
@@ -147,22 +146,20 @@ impl Stage {
         self.app.update();
     }
 
-    /// An organ with one system of vessels.
-    pub fn spawn(&mut self, system: VesselKind, tree: &VesselTree) -> Entity {
-        self.spawn_born(system, tree, &[])
+    /// An organ with one kind of vessels.
+    pub fn spawn(&mut self, kind: VesselKind, tree: &VesselTree) -> Entity {
+        self.spawn_born(kind, tree, &[])
     }
 
-    /// An organ with one system of vessels, born in the given steps.
-    pub fn spawn_born(&mut self, system: VesselKind, tree: &VesselTree, birth_steps: &[u32]) -> Entity {
+    /// An organ with one kind of vessels, born in the given steps.
+    pub fn spawn_born(&mut self, kind: VesselKind, tree: &VesselTree, birth_steps: &[u32]) -> Entity {
         let world = self.app.world_mut();
-        let look = VesselAppearance {
-            arterial: Color::srgb(0.8, 0.05, 0.05),
-            venous: Color::srgb(0.1, 0.1, 0.8),
-            ..default()
-        };
+        let (artery, vein) = (Color::srgb(0.8, 0.05, 0.05), Color::srgb(0.1, 0.1, 0.8));
+        let colors = ByKind { artery, vein, ..VesselAppearance::DEFAULT_COLORS };
+        let look = VesselAppearance { colors, ..default() };
         let organ = world.spawn((Prop, Transform::default(), Visibility::default(), look)).id();
-        let vessels = Vessels::from_tree(tree, birth_steps);
-        world.spawn((ChildOf(organ), VesselsOf(organ), VesselSystem(system), vessels));
+        let vessels = Vessels::from_tree(kind, tree, birth_steps);
+        world.spawn((ChildOf(organ), VesselsOf(organ), vessels));
         organ
     }
 
@@ -190,21 +187,21 @@ impl Stage {
         self.app.world().get::<OrganVessels>(organ).expect("an organ with vessels").entities()[0]
     }
 
-    /// Gives an organ another tree, of which `changed` nodes are said to be different, or all, where there are none.
-    pub fn replace(&mut self, organ: Entity, tree: &VesselTree, changed: Range<usize>) {
-        self.replace_nodes(organ, tree, &changed.collect::<Vec<_>>());
-    }
-
-    /// [`replace`](Self::replace), with nodes here and there.
-    pub fn replace_nodes(&mut self, organ: Entity, tree: &VesselTree, changed: &[usize]) {
+    /// Gives an organ another tree in place of its own.
+    pub fn replace(&mut self, organ: Entity, tree: &VesselTree) {
         let vessels = self.vessels(organ);
         let mut vessels = self.app.world_mut().entity_mut(vessels);
-        vessels.insert(Vessels::from_tree(tree, &[]));
-        let mut changes = vessels.get_mut::<SegmentChanges>().expect("required by the system");
-        if changed.is_empty() {
-            changes.mark_all();
-        }
-        changed.iter().for_each(|&node| changes.mark_node(node));
+        let kind = vessels.get::<Vessels>().expect("vessels").kind();
+        vessels.insert(Vessels::from_tree(kind, tree, &[]));
+    }
+
+    /// Changes an organ's tree, whose nodes keep their parents, and says that it did so at some nodes, be it true or not.
+    pub fn change(&mut self, organ: Entity, tree: &VesselTree, said: impl IntoIterator<Item = usize>) {
+        let vessels = self.vessels(organ);
+        let mut vessels = self.app.world_mut().entity_mut(vessels);
+        let mut truth = ChangeLog::default();
+        vessels.get_mut::<Vessels>().expect("vessels").update_from_tree(tree, &[], &mut truth);
+        vessels.get_mut::<ChangeLog>().expect("required by vessels").mark(said);
     }
 
     /// Lets lights cast shadows, or not.

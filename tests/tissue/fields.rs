@@ -1,11 +1,8 @@
-//! Masks, guides, density fields, stages, and the settings that put them together.
+//! Masks, guides, density fields and stages.
 
 use super::{Outcome, assert_closest, assert_moments, ball_soup, grid, in_cube, rng, samples};
 use bevy_math::{UVec2, UVec3, Vec2, Vec3};
-use bevy_vessels::synthesis::{
-    mesh::{TriangleMesh, VoxelError},
-    tissue::*,
-};
+use bevy_vessels::synthesis::tissue::*;
 use std::sync::Arc;
 
 #[test]
@@ -164,78 +161,5 @@ fn stages_follow_each_other() -> Outcome {
     let field = DensityField::function(|_| 0.5);
     assert_eq!(DensityTissue::new(staged.clone(), field).err(), Some(TissueError::DensityOverStages));
     assert_eq!(Staged::new(vec![(staged, 3)], disc).err(), Some(TissueError::StagesWithinStages));
-    Ok(())
-}
-
-fn settings(mode: TissueMode) -> TissueSettings {
-    TissueSettings { mode, resolution: 24, ..TissueSettings::default() }
-}
-
-#[test]
-fn settings_build_what_they_say() -> Outcome {
-    let ball = ball_soup(24, false)?;
-    let (area, volume) = (ball.area() as f32, ball.signed_volume() as f32);
-    let surface = settings(TissueMode::Surface).build(&ball)?;
-    assert!(matches!(surface.extent(), Extent::Area(found) if (found / area - 1.0).abs() < 1e-4));
-    let solid = settings(TissueMode::Volume).build(&ball)?;
-    assert!(matches!(solid.extent(), Extent::Volume(found) if (found / volume - 1.0).abs() < 0.02));
-    let guide = Guide { points: vec![Vec3::X, Vec3::Y], deviation: 0.05, steps: 4 };
-    let staged = TissueSettings { guides: vec![guide], ..settings(TissueMode::Staged { surface_steps: 10 }) };
-    let tissue = staged.build(&ball)?;
-    assert!(matches!(tissue.at_step(4).extent(), Extent::Length(_)));
-    assert!(matches!(tissue.at_step(5).extent(), Extent::Area(_)));
-    assert!(matches!(tissue.at_step(14).extent(), Extent::Area(_)));
-    assert!(matches!(tissue.at_step(15).extent(), Extent::Volume(_)));
-    assert!(matches!(tissue.extent(), Extent::Volume(_)));
-
-    // Nothing below the equator.
-    let upper: Vec<f32> = ball.positions().iter().map(|p| if p.z > 0.0 { 1.0 } else { -1.0 }).collect();
-    for mode in [TissueMode::Surface, TissueMode::Volume, TissueMode::Staged { surface_steps: 1 }] {
-        let tissue = TissueSettings { density: Some(upper.clone()), ..settings(mode) }.build(&ball)?;
-        for step in [1, 2] {
-            let points = samples(tissue.at_step(step), 2000, 3);
-            assert!(points.len() > 700 && points.len() < 1300, "{} of 2000 kept", points.len());
-            assert!(points.iter().all(|point| point.z > -0.15));
-        }
-    }
-    Ok(())
-}
-
-#[test]
-fn impossible_settings_are_refused() -> Outcome {
-    let ball = ball_soup(6, false)?;
-    let with = |change: fn(&mut TissueSettings)| {
-        let mut settings = settings(TissueMode::Staged { surface_steps: 3 });
-        change(&mut settings);
-        settings.build(&ball).err()
-    };
-    assert_eq!(with(|_| ()), None);
-    assert_eq!(with(|settings| settings.resolution = 0), Some(TissueError::Voxels(VoxelError::NoResolution)));
-    assert!(matches!(with(|settings| settings.density = Some(vec![])), Some(TissueError::DensityCount { .. })));
-    assert!(matches!(with(|settings| settings.guides.push(Guide::default())), Some(TissueError::GuidePoints { .. })));
-    let sheet = grid(3, 1.0)?;
-    assert_eq!(settings(TissueMode::Volume).build(&sheet).err(), Some(TissueError::NoInside { resolution: 24 }));
-    assert!(settings(TissueMode::Surface).build(&sheet).is_ok());
-    let mesh = TriangleMesh::new(vec![Vec3::X; 3], vec![[0, 1, 2]], None);
-    assert!(mesh.is_err());
-    Ok(())
-}
-
-#[cfg(feature = "serialize")]
-#[test]
-fn settings_are_written_and_read_as_ron() -> Outcome {
-    let guides = vec![Guide { points: vec![Vec3::X, Vec3::Y], deviation: 0.1, steps: 7 }];
-    let settings = TissueSettings {
-        mode: TissueMode::Staged { surface_steps: 9 },
-        resolution: 64,
-        guides,
-        density: Some(vec![0.5]),
-    };
-    let text = ron::to_string(&settings)?;
-    assert_eq!(ron::from_str::<TissueSettings>(&text)?, settings);
-    assert_eq!(ron::from_str::<TissueSettings>("()")?, TissueSettings::default());
-    let volume: TissueSettings = ron::from_str("(mode: Volume)")?;
-    assert_eq!(volume.mode, TissueMode::Volume);
-    assert!(ron::from_str::<TissueSettings>("(mood: Volume)").is_err());
     Ok(())
 }

@@ -1,6 +1,8 @@
 //! Tissues against their oracles: analytic moments, brute force, and meshes whose volume is known.
 
 mod fields;
+mod no_go;
+mod sources;
 mod volume;
 
 use bevy_math::{

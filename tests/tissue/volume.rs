@@ -3,7 +3,7 @@
 use super::{Outcome, assert_moments, ball_soup, grid, in_cube, random_mesh, rng, samples};
 use bevy_math::{DVec3, Vec3};
 use bevy_vessels::synthesis::{
-    mesh::TriangleMesh,
+    mesh::{TriangleMesh, VoxelError},
     tissue::{Extent, MeshVolume, Tissue, TissueError},
 };
 use rand::RngExt;

@@ -22,7 +22,7 @@ use crate::plugin::{
 use crate::synthesis::{
     mesh::TriangleMesh,
     pace::{Pace, at_once},
-    tissue::{Tissue, TissueSettings},
+    tissue::{SourceData, Tissue, TissueSource},
 };
 use bevy::{
     asset::{AssetEvent, AssetId, AssetServer, Assets, LoadState},
@@ -175,9 +175,10 @@ fn mesh_news(event: &AssetEvent<Mesh>) -> Option<(AssetId<Mesh>, bool)> {
 }
 
 /// The slow part of the preparation, as a pure function of what was copied from the mesh.
-async fn prepare(copy: MeshCopy, settings: TissueSettings, pace: Pace) -> Prepared {
+async fn prepare(copy: MeshCopy, source: TissueSource, pace: Pace) -> Prepared {
     let mesh = TriangleMesh::new(copy.positions, copy.triangles, None).map_err(OrganMeshError::from)?;
-    Ok(settings.build_paced(&mesh, &pace).await?)
+    let data = SourceData { mesh: Some(Arc::new(mesh)), image: None };
+    Ok(Arc::clone(source.prepare_paced(&data, &pace).await?.tissue()))
 }
 
 impl OrganMeshes<'_> {

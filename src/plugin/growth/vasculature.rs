@@ -15,7 +15,7 @@ use crate::synthesis::{
     generator::Generator,
     preset::{Preset, PresetName},
     roots::RootPlacements,
-    tissue::TissueSettings,
+    tissue::TissueSource,
 };
 use bevy::{
     camera::visibility::Visibility,
@@ -50,8 +50,8 @@ pub struct Vasculature {
     pub generator: Generator,
     /// Where vessels enter the organ, in the local space of its mesh.
     pub roots: RootPlacements,
-    /// Which part of the organ is to be supplied: its surface, its inside or both.
-    pub tissue: TissueSettings,
+    /// What is to be supplied: the surface of the organ's mesh, its inside or both; a plain shape; or what an image shows.
+    pub tissue: TissueSource,
     /// Whether the lengths of the [`generator`](Self::generator) are made for a tissue of equivalent diameter 1, as those of
     /// all presets are, and are to be fitted to this organ ([`Generator::fit`]).
     ///
@@ -82,6 +82,13 @@ impl Vasculature {
     #[must_use]
     pub fn with_generator(mut self, generator: impl Into<Generator>) -> Self {
         self.generator = generator.into();
+        self
+    }
+
+    /// Grows on another tissue: another [mode](crate::synthesis::tissue::TissueMode) of the mesh, a shape, an image.
+    #[must_use]
+    pub fn with_tissue(mut self, tissue: impl Into<TissueSource>) -> Self {
+        self.tissue = tissue.into();
         self
     }
 

@@ -4,8 +4,8 @@
 
 use crate::synthesis::mesh::{MeshError, TriangleMesh};
 use bevy::{
-    math::Vec3,
-    mesh::{Indices, Mesh, MeshAccessError, PrimitiveTopology, VertexFormat},
+    math::{Vec2, Vec3},
+    mesh::{Indices, Mesh, MeshAccessError, PrimitiveTopology, VertexAttributeValues, VertexFormat},
 };
 
 /// Why a mesh cannot be an organ.
@@ -47,19 +47,27 @@ pub enum OrganMeshError {
 pub(crate) struct MeshCopy {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
+    /// Texture coordinates, one per vertex, where the mesh has any.
+    pub(crate) uvs: Option<Vec<Vec2>>,
+}
+
+impl MeshCopy {
+    /// Checks it.
+    pub(crate) fn check(self) -> Result<TriangleMesh, OrganMeshError> {
+        Ok(TriangleMesh::new(self.positions, self.triangles, self.uvs)?)
+    }
 }
 
 /// Reads the triangles of a mesh.
 ///
 /// Without indices the vertices follow one another. In a strip every second triangle is turned, so that all face the
 /// same way, and an index of all ones begins a new strip. Left-over vertices at the end are dropped, as the graphics card
-/// does. Vertices keep their numbers.
+/// does. Vertices keep their numbers, and their texture coordinates where those are two floats each.
 ///
 /// # Errors
 /// What is missing or wrong, and how to repair it.
 pub fn triangle_mesh(mesh: &Mesh) -> Result<TriangleMesh, OrganMeshError> {
-    let copy = copy_mesh(mesh)?;
-    Ok(TriangleMesh::new(copy.positions, copy.triangles, None)?)
+    copy_mesh(mesh)?.check()
 }
 
 /// The positions of a mesh's vertices, where they are in main memory and three floats each.
@@ -84,7 +92,16 @@ pub(crate) fn copy_mesh(mesh: &Mesh) -> Result<MeshCopy, OrganMeshError> {
         Some(Indices::U32(indices)) => triangles(indices, u32::MAX, topology),
         None => triangles(&(0..positions.len() as u32).collect::<Vec<_>>(), u32::MAX, topology),
     };
-    Ok(MeshCopy { positions, triangles })
+    let uvs = uvs(mesh).filter(|uvs| uvs.len() == positions.len());
+    Ok(MeshCopy { positions, triangles, uvs })
+}
+
+/// The first texture coordinates, where they are two floats each.
+fn uvs(mesh: &Mesh) -> Option<Vec<Vec2>> {
+    match mesh.try_attribute(Mesh::ATTRIBUTE_UV_0).ok()? {
+        VertexAttributeValues::Float32x2(uvs) => Some(uvs.iter().copied().map(Vec2::from).collect()),
+        _ => None,
+    }
 }
 
 /// Triangles of a row of indices. `restart` ends a strip; in a list it is a vertex like any other.
@@ -143,6 +160,16 @@ mod tests {
             assert_eq!(read.positions().len(), 4);
             assert_eq!(normals(&read), [Vec3::Z; 2], "{mesh:?}");
         }
+    }
+
+    #[test]
+    fn texture_coordinates_are_kept() {
+        let plain = square(PrimitiveTopology::TriangleStrip);
+        let uvs: Vec<[f32; 2]> = SQUARE.iter().map(|&[x, y, _]| [x, 1.0 - y]).collect();
+        let read = |mesh: Mesh| triangle_mesh(&mesh).map(|mesh| mesh.uvs().map(<[Vec2]>::to_vec));
+        assert_eq!(read(plain.clone()), Ok(None));
+        let kept = read(plain.clone().with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, uvs.clone()));
+        assert_eq!(kept, Ok(Some(uvs.into_iter().map(Vec2::from).collect())));
     }
 
     #[test]

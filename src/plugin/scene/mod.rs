@@ -76,9 +76,7 @@ impl Plugin for ScenePlugin {
         app.init_asset::<PresetAsset>().register_asset_reflect::<PresetAsset>().register_asset_loader(PresetLoader);
         app.add_systems(
             self.schedule,
-            organ_preset::follow_presets
-                .before(VesselSystems::Source)
-                .run_if(resource_exists::<Assets<PresetAsset>>),
+            organ_preset::follow_presets.before(VesselSystems::Source).run_if(resource_exists::<Assets<PresetAsset>>),
         );
     }
 }

@@ -28,10 +28,8 @@ struct GivenTree {
 
 impl Serialize for Vessels {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let given = (!self.is_grown()).then(|| GivenTree {
-            tree: self.tree_at_rest().into_owned(),
-            birth_steps: self.birth_steps().to_vec(),
-        });
+        let given = (!self.is_grown())
+            .then(|| GivenTree { tree: self.tree_at_rest().into_owned(), birth_steps: self.birth_steps().to_vec() });
         SavedVessels { kind: self.kind(), hash: self.hash(), given }.serialize(serializer)
     }
 }

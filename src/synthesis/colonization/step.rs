@@ -77,7 +77,8 @@ impl<'a> Step<'a> {
     pub fn ground(self) -> Ground<'a> {
         let tissue = self.tissue.at_step(self.number);
         let surface = matches!(tissue.extent(), Extent::Area(_));
-        Ground { tissue, confine: self.settings.confine, normals: self.settings.stand_off && surface }
+        let (confine, normals) = (self.settings.confine, self.settings.stand_off && surface);
+        Ground { tissue, no_go: tissue.no_go(), confine, normals }
     }
 
     /// Number of steps in a row that brought nothing, given the one before this and whether this `acted`. Steps do not count

@@ -9,7 +9,7 @@ use super::settings::SystemSettings;
 use crate::synthesis::colonization::drains::{Drains, News};
 use crate::synthesis::parallel;
 use crate::synthesis::space::point_grid::PointGrid;
-use crate::synthesis::tissue::{Tissue, TissuePoint};
+use crate::synthesis::tissue::{NoGoField, Tissue, TissuePoint};
 use crate::synthesis::tree::BedLink;
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d};
@@ -20,6 +20,8 @@ use std::ops::Range;
 pub(crate) struct Ground<'a> {
     /// The tissue in force.
     pub tissue: &'a dyn Tissue,
+    /// Where no node may be placed.
+    pub no_go: Option<&'a NoGoField>,
     /// Whether nodes that leave it are brought back.
     pub confine: bool,
     /// Whether nodes need the tissue's normal although they are not brought back.
@@ -27,7 +29,14 @@ pub(crate) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    fn place(&self, position: Vec3) -> TissuePoint {
+    /// Where the end of a new segment comes to lie; `None` where no vessel may be, halfway or at the end.
+    fn place(&self, from: Vec3, to: Vec3) -> Option<TissuePoint> {
+        let end = self.confined(to);
+        let forbidden = |point| self.no_go.is_some_and(|no_go| no_go.forbids(point));
+        (!forbidden(end.position) && !forbidden(from.midpoint(end.position))).then_some(end)
+    }
+
+    fn confined(&self, position: Vec3) -> TissuePoint {
         if self.confine {
             return self.tissue.closest_point(position);
         }
@@ -47,12 +56,11 @@ pub(crate) struct Supplied {
     pub node: u32,
 }
 
-/// A node that grows, and the ends of its new segments.
+/// A node that grows, and the ends of its new segments, two at most.
 #[derive(Clone, Copy, Debug, Default)]
 struct Growing {
     node: u32,
-    count: usize,
-    tips: [TissuePoint; 2],
+    tips: [Option<TissuePoint>; 2],
 }
 
 /// The forest and the drains of one system, with the lengths in force.
@@ -206,15 +214,14 @@ impl SystemGrowth {
             let pulls = &pulls[range.clone()];
             let node = pulls[0].node;
             let position = forest.tree.positions()[node as usize];
-            let place = |direction: Vec3| ground.place(position + direction * lengths.step);
+            let place = |direction: Vec3| ground.place(position, position + direction * lengths.step);
             let drains = pulls.iter().map(|pull| drains.position(pull.drain));
-            match decide(forest, lengths, node, drains) {
-                Decision::Extend(direction) => {
-                    Growing { node, count: 1, tips: [place(direction), TissuePoint::default()] }
-                }
-                Decision::Bifurcate(directions) => Growing { node, count: 2, tips: directions.map(place) },
-                Decision::Rest => Growing { node, ..Growing::default() },
-            }
+            let tips = match decide(forest, lengths, node, drains) {
+                Decision::Extend(direction) => [place(direction), None],
+                Decision::Bifurcate(directions) => directions.map(place),
+                Decision::Rest => [None; 2],
+            };
+            Growing { node, tips }
         });
     }
 
@@ -222,7 +229,7 @@ impl SystemGrowth {
     fn extend(&mut self, step: u32) {
         let Self { forest, lengths, growing, .. } = self;
         for growing in growing {
-            for &tip in &growing.tips[..growing.count] {
+            for &tip in growing.tips.iter().flatten() {
                 let free = tip.position.is_finite()
                     && !forest.index().any_within(tip.position, LEAST_SEPARATION * lengths.step);
                 if free {

@@ -4,6 +4,7 @@
 //! work with, its [`topology`], an index of its triangles ([`TriangleIndex`]) and its voxels.
 
 pub(crate) mod bit_grid;
+mod indexed;
 mod shaded;
 pub(crate) mod tet_mesh;
 pub mod topology;
@@ -13,6 +14,7 @@ pub(crate) mod voxels;
 mod welding;
 pub(crate) mod winding;
 
+pub use indexed::IndexedMesh;
 pub use shaded::ShadedMesh;
 pub use tet_mesh::{TetMesh, TetMeshError};
 pub use topology::MeshTopology;

@@ -53,8 +53,22 @@ pub enum RootError {
         /// The largest number.
         limit: u32,
     },
+    /// A root in a no-go region of the tissue.
+    #[error(
+        "the {} root at {position} is in a no-go region; move it, or make the region smaller",
+        kind.name()
+    )]
+    Forbidden {
+        /// The system whose root it is.
+        kind: VesselKind,
+        /// Where it would be.
+        position: Vec3,
+    },
     /// A tissue that gave fewer places than roots are to be spread.
-    #[error("the tissue has room for {found} of {wanted} {} roots; ask for fewer", kind.name())]
+    #[error(
+        "the tissue has room for {found} of {wanted} {} roots; ask for fewer, or leave more of it free of no-go regions",
+        kind.name()
+    )]
     NoRoom {
         /// The kind in question.
         kind: VesselKind,

@@ -179,6 +179,7 @@ impl Roots {
                 RootPlacement::Exact(points) => exact(tissue, kind, points, own.reach)?,
             };
         }
+        check_allowed(&roots, tissue)?;
         check_apart(&roots, spacing)?;
         Ok(roots)
     }
@@ -250,6 +251,17 @@ fn check_finite(kind: VesselKind, points: &[Vec3]) -> Result<(), RootError> {
         Some(&position) => Err(RootError::NotFinite { kind, position }),
         None => Ok(()),
     }
+}
+
+/// Refuses roots where no vessel may be.
+fn check_allowed(roots: &ByKind<Vec<TissuePoint>>, tissue: &dyn Tissue) -> Result<(), RootError> {
+    let Some(no_go) = tissue.no_go() else { return Ok(()) };
+    for (kind, roots) in roots.iter() {
+        if let Some(root) = roots.iter().find(|root| no_go.forbids(root.position)) {
+            return Err(RootError::Forbidden { kind, position: root.position });
+        }
+    }
+    Ok(())
 }
 
 /// Refuses roots at the same place, of one kind or of two.

@@ -57,13 +57,19 @@ pub(super) fn draw(tissue: &dyn Tissue, wanted: u32, rng: &mut VesselRng) -> Vec
     tissue.entrance().into_iter().chain(draws).take(wanted as usize).collect()
 }
 
-/// A point of the tissue one step length from a root: of several directions the one whose point comes out best.
+/// A point of the tissue one step length from a root: of several directions the one whose point comes out best. Where no
+/// vessel may be is no place for it, unless there is no other.
 pub(super) fn beside(tissue: &dyn Tissue, root: &TissuePoint, step: f32, rng: &mut VesselRng) -> TissuePoint {
+    let forbidden = |point: Vec3| tissue.no_go().is_some_and(|no_go| no_go.forbids(point));
     let mut best: Option<(f32, TissuePoint)> = None;
     for _ in 0..DIRECTIONS {
         let direction = tangent(root.normal, rng);
         let point = tissue.closest_point(root.position + direction * step);
-        let error = (point.position.distance(root.position) - step).abs();
+        let error = if forbidden(point.position) {
+            f32::INFINITY
+        } else {
+            (point.position.distance(root.position) - step).abs()
+        };
         if best.is_none_or(|(least, _)| error < least) {
             best = Some((error, point));
         }

@@ -1,10 +1,10 @@
 //! Density fields: where a tissue asks for more vessels and where for fewer, such as hypoxic regions.
 
-use crate::synthesis::{mesh::TriangleMesh, random::VesselRng};
 use crate::synthesis::{
-    mesh::triangle_index::TriangleIndex,
+    mesh::{IndexedMesh, TriangleMesh},
+    random::VesselRng,
     tissue::{
-        Extent, Tissue, TissuePiece, TissuePoint,
+        Extent, NoGoField, Tissue, TissuePiece, TissuePoint,
         error::{TissueError, finite_point, positive},
     },
 };
@@ -19,7 +19,7 @@ pub struct DensityField(Field);
 #[derive(Clone)]
 enum Field {
     Function(Arc<dyn Fn(Vec3) -> f32 + Send + Sync>),
-    Vertices { index: Arc<TriangleIndex>, triangles: Arc<[[u32; 3]]>, values: Arc<[f32]> },
+    Vertices { mesh: IndexedMesh, values: Arc<[f32]> },
     Grid { size: [usize; 3], spacing: Vec3, origin: Vec3, values: Arc<[f32]> },
 }
 
@@ -37,10 +37,17 @@ impl DensityField {
     /// # Errors
     /// Values that are not one per vertex, or not a number.
     pub fn on_vertices(mesh: &TriangleMesh, values: &[f32]) -> Result<Self, TissueError> {
-        let expected = mesh.positions().len();
-        let values = check(values, expected)?;
-        let (index, triangles) = (Arc::new(TriangleIndex::new(mesh)), mesh.triangles().into());
-        Ok(Self(Field::Vertices { index, triangles, values }))
+        let values = check(values, mesh.positions().len())?;
+        Ok(Self(Field::Vertices { mesh: IndexedMesh::new(mesh.clone()), values }))
+    }
+
+    /// The same with the mesh's index at hand, which is shared.
+    ///
+    /// # Errors
+    /// Those of [`on_vertices`](Self::on_vertices).
+    pub fn on_indexed(mesh: &IndexedMesh, values: &[f32]) -> Result<Self, TissueError> {
+        let values = check(values, mesh.mesh().positions().len())?;
+        Ok(Self(Field::Vertices { mesh: mesh.clone(), values }))
     }
 
     /// A field on the points of a grid, along x first, then y, then z, interpolated between them. `origin` is the first
@@ -65,10 +72,7 @@ impl DensityField {
     pub fn at(&self, point: Vec3) -> f32 {
         let value = match &self.0 {
             Field::Function(field) => field(point),
-            Field::Vertices { index, triangles, values } => index.closest(point).map_or(0.0, |found| {
-                let corners = triangles[found.triangle].map(|vertex| values[vertex as usize]);
-                Vec3::from_array(corners).dot(found.barycentric)
-            }),
+            Field::Vertices { mesh, values } => mesh.value_near(point, values).unwrap_or(0.0),
             Field::Grid { size, spacing, origin, values } => interpolate(*size, (point - *origin) / *spacing, values),
         };
         if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
@@ -179,5 +183,9 @@ impl Tissue for DensityTissue {
 
     fn entrance(&self) -> Option<Vec3> {
         self.tissue.entrance()
+    }
+
+    fn no_go(&self) -> Option<&NoGoField> {
+        self.tissue.no_go()
     }
 }

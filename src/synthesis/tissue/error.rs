@@ -86,6 +86,32 @@ pub enum TissueError {
     /// A density field over a tissue that changes in stages.
     #[error("a density field cannot be put over a staged tissue; put it over its stages")]
     DensityOverStages,
+    /// Marks of a no-go region that are not one for each vertex.
+    #[error("{values} vertices are marked as no-go or free; the mesh has {expected}, give one mark for each")]
+    NoGoCount {
+        /// Number of marks.
+        values: usize,
+        /// Number of vertices.
+        expected: usize,
+    },
+    /// No-go regions over a tissue that changes in stages.
+    #[error("no-go regions cannot be laid over a staged tissue; lay them over its stages")]
+    NoGoOverStages,
+    /// A staged tissue as one that is to be painted.
+    #[error("a staged tissue cannot be painted; prepare and paint its stages")]
+    PaintOverStages,
+    /// Something painted on the vertices of a tissue that has none.
+    #[error("{what} is painted on vertices, but the tissue is not made of a mesh; leave it out, or mark balls and boxes")]
+    NoVertices {
+        /// What is painted.
+        what: &'static str,
+    },
+    /// A tissue that is to be made of a mesh without one.
+    #[error("the tissue is to be made of the organ's mesh, but there is none; give the organ a mesh, or choose a shape")]
+    NoMesh,
+    /// A tissue that is to be made of an image without one.
+    #[error("the tissue is to be made of the organ's image, but there is none; give the organ an image, or choose a shape")]
+    NoImage,
     /// A staged tissue as the stage of another.
     #[error("a stage of a staged tissue cannot be staged itself; list its stages instead")]
     StagesWithinStages,

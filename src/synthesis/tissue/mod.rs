@@ -12,16 +12,21 @@
 //! | [`mask`] | the set pixels or voxels of an image |
 //! | [`path`] | guides: polylines with a deviation |
 //! | [`density`] | any of these, with regions that ask for more or fewer vessels |
+//! | [`no_go`] | any of these, with regions where no vessel may be |
 //! | [`staged`] | one after the other |
 //!
-//! [`source`] describes the tissue of an organ as data, and builds it from the organ's mesh.
+//! [`source`] says as data where the tissue of an organ comes from: its mesh, a shape or an image. What takes long is done
+//! once, and gives a [`PreparedTissue`]; [`paint`], which is data too, is laid over that as often as one likes.
 
 pub mod density;
 mod error;
 pub mod growth;
 pub mod mask;
+pub mod no_go;
+pub mod paint;
 pub mod path;
 mod pieces;
+mod prepared;
 pub mod shape;
 pub mod source;
 pub mod staged;
@@ -32,10 +37,13 @@ pub use density::{DensityField, DensityTissue};
 pub use error::TissueError;
 pub use growth::TissueGrowth;
 pub use mask::Mask;
+pub use no_go::{NoGoField, NoGoRegion, NoGoTissue};
+pub use paint::{Guide, NoGo, TissuePaint};
 pub use path::GuidePath;
 pub use pieces::TissuePiece;
+pub use prepared::PreparedTissue;
 pub use shape::{Ball, Cuboid, Disc, Ellipsoid, Rectangle};
-pub use source::{Guide, TissueMode, TissueSettings};
+pub use source::{ImageChannel, ImageTissue, MeshTissue, SourceData, TissueImage, TissueMode, TissueShape, TissueSource};
 pub use staged::Staged;
 pub use surface::MeshSurface;
 pub use volume::MeshVolume;
@@ -124,6 +132,14 @@ pub trait Tissue: Debug + Send + Sync {
 
     /// Where vessels enter the tissue of themselves, if there is such a place: the beginning of a guide.
     fn entrance(&self) -> Option<Vec3> {
+        None
+    }
+
+    /// Where no vessel may be; `None` where vessels may be everywhere, so that nothing has to be asked.
+    ///
+    /// [`sample`](Self::sample), [`draw`](Self::draw), [`point_of`](Self::point_of) and [`entrance`](Self::entrance) give no
+    /// point that this forbids. A generator places no node there; [`closest_point`](Self::closest_point) doesn't know of it.
+    fn no_go(&self) -> Option<&NoGoField> {
         None
     }
 

@@ -1,6 +1,6 @@
 //! Staged tissues: first along guides, then over the surface, then through the volume (Rauch & Harders 2021, Fig. 3 and 4).
 
-use super::{Extent, Tissue, TissuePoint, error::TissueError};
+use super::{Extent, NoGoField, Tissue, TissuePoint, error::TissueError};
 use crate::synthesis::random::VesselRng;
 use bevy_math::{
     Vec3,
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Tissues that are in force one after the other.
 ///
 /// Growth asks for the one [in force](trait@Tissue#method.at_step) at each step. Asked as a whole, a staged tissue holds
-/// what any of its stages holds; its extent, and what is drawn from it, are those of its last stage, which is the tissue
+/// what any of its stages holds; its extent, its no-go regions and what is drawn from it are those of its last stage, which is the tissue
 /// that goes on and by which settings are fitted.
 #[derive(Clone, Debug)]
 pub struct Staged {
@@ -74,6 +74,10 @@ impl Tissue for Staged {
 
     fn entrance(&self) -> Option<Vec3> {
         self.all().find_map(|stage| stage.entrance())
+    }
+
+    fn no_go(&self) -> Option<&NoGoField> {
+        self.last.no_go()
     }
 
     fn stage(&self, step: u32) -> Option<&dyn Tissue> {

@@ -1,15 +1,13 @@
 //! The surface of an organ's mesh as a tissue.
 
 use crate::synthesis::{
-    mesh::TriangleMesh,
+    mesh::{IndexedMesh, SurfacePoint, TriangleIndex, TriangleMesh},
     random::{VesselRng, alias_table::AliasTable, many},
-};
-use crate::synthesis::{
-    mesh::triangle_index::{SurfacePoint, TriangleIndex},
     tissue::{Extent, Tissue, TissuePiece, TissuePoint, error::TissueError, pieces},
 };
 use bevy_math::{Vec3, bounding::Aabb3d};
 use rand::RngExt;
+use std::sync::Arc;
 
 /// Distance from the surface, relative to the longest side of its box, within which a point counts as on it.
 pub const SURFACE_TOLERANCE: f32 = 1.0e-5;
@@ -19,8 +17,7 @@ pub const SURFACE_TOLERANCE: f32 = 1.0e-5;
 /// Points are drawn in constant time and projected through an index over the triangles.
 #[derive(Clone, Debug)]
 pub struct MeshSurface {
-    mesh: TriangleMesh,
-    index: TriangleIndex,
+    indexed: IndexedMesh,
     /// Unit normal of every vertex, pointing out of a closed mesh.
     normals: Vec<Vec3>,
     /// −1 where the mesh as a whole faces inwards.
@@ -39,7 +36,9 @@ impl MeshSurface {
     ///
     /// # Errors
     /// None for a [`TriangleMesh`], which is checked; the result type is that of every tissue.
-    pub fn new(mesh: TriangleMesh) -> Result<Self, TissueError> {
+    pub fn new(mesh: impl Into<Arc<TriangleMesh>>) -> Result<Self, TissueError> {
+        let indexed = IndexedMesh::new(mesh);
+        let mesh = indexed.mesh();
         let bounds = mesh.bounds();
         let facing = if mesh.signed_volume() < 0.0 && mesh.is_closed() { -1.0 } else { 1.0 };
         let mut normals = mesh.vertex_normals();
@@ -48,32 +47,36 @@ impl MeshSurface {
             .map(|triangle| if mesh.is_degenerate(triangle) { 0.0 } else { mesh.triangle_area(triangle) })
             .collect();
         Ok(Self {
-            index: TriangleIndex::new(&mesh),
             normals,
             facing,
             picks: AliasTable::new(areas.iter().copied()),
             area: areas.iter().sum::<f64>() as f32,
             tolerance: (bounds.max - bounds.min).max_element() * SURFACE_TOLERANCE,
             bounds,
-            mesh,
+            indexed,
         })
     }
 
     /// The mesh.
     pub fn mesh(&self) -> &TriangleMesh {
-        &self.mesh
+        self.indexed.mesh()
     }
 
     /// The index over the mesh's triangles.
     pub fn index(&self) -> &TriangleIndex {
-        &self.index
+        self.indexed.index()
+    }
+
+    /// The mesh together with that index, to be shared.
+    pub fn indexed(&self) -> &IndexedMesh {
+        &self.indexed
     }
 
     /// Unit normal at a point of the mesh: that of the vertices, interpolated; the triangle's own where they cancel out
     /// or point to its other side.
     pub fn normal_at(&self, point: &SurfacePoint) -> Vec3 {
-        let own = self.mesh.triangle_normal(point.triangle) * self.facing;
-        let corners = self.mesh.triangles()[point.triangle].map(|vertex| self.normals[vertex as usize]);
+        let own = self.mesh().triangle_normal(point.triangle) * self.facing;
+        let corners = self.mesh().triangles()[point.triangle].map(|vertex| self.normals[vertex as usize]);
         let weights = point.barycentric;
         let smooth = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
         match smooth.try_normalize() {
@@ -86,7 +89,7 @@ impl MeshSurface {
 impl MeshSurface {
     /// Number of parts into which a triangle's sides are cut so that none of them reaches further than `reach`.
     fn parts(&self, triangle: usize, reach: f32) -> u32 {
-        let [a, b, c] = self.mesh.corners(triangle);
+        let [a, b, c] = self.mesh().corners(triangle);
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
         // A triangle reaches two thirds of its median from its centre at the most, and that less than this share of a side.
         pieces::parts(longest, 1.5 * reach)
@@ -99,7 +102,7 @@ impl MeshSurface {
 
     /// The point of a triangle that two even numbers choose.
     fn point_in(&self, triangle: usize, [mut v, mut w]: [f32; 2]) -> Vec3 {
-        let [a, b, c] = self.mesh.corners(triangle);
+        let [a, b, c] = self.mesh().corners(triangle);
         // Evenly over the parallelogram, its far half folded back.
         if v + w > 1.0 {
             (v, w) = (1.0 - v, 1.0 - w);
@@ -118,11 +121,11 @@ impl Tissue for MeshSurface {
     }
 
     fn contains(&self, point: Vec3) -> bool {
-        self.index.any_within(point, self.tolerance)
+        self.index().any_within(point, self.tolerance)
     }
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
-        match self.index.closest(point) {
+        match self.index().closest(point) {
             Some(found) => TissuePoint { position: found.position, normal: self.normal_at(&found) },
             // Only of a point that is not finite there is no closest.
             None => TissuePoint { position: point, normal: Vec3::ZERO },
@@ -148,10 +151,10 @@ impl Tissue for MeshSurface {
 
     /// Triangles whose sides are longer than `reach` allows are cut into k² equal ones, by lines along their sides.
     fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
-        for triangle in (0..self.mesh.triangles().len()).filter(|&triangle| !self.mesh.is_degenerate(triangle)) {
-            let [a, b, c] = self.mesh.corners(triangle);
+        for triangle in (0..self.mesh().triangles().len()).filter(|&triangle| !self.mesh().is_degenerate(triangle)) {
+            let [a, b, c] = self.mesh().corners(triangle);
             let parts = self.parts(triangle, reach);
-            let measure = self.mesh.triangle_area(triangle) as f32 / (parts * parts) as f32;
+            let measure = self.mesh().triangle_area(triangle) as f32 / (parts * parts) as f32;
             for part in 0..parts * parts {
                 let corners = small_triangle(part, parts).map(|[v, w]| a + (b - a) * v + (c - a) * w);
                 let center = (corners[0] + corners[1] + corners[2]) / 3.0;
@@ -163,7 +166,7 @@ impl Tissue for MeshSurface {
     }
 
     fn point_of(&self, reach: f32, [triangle, part]: [u32; 2], [v, w, _]: [f32; 3]) -> Option<Vec3> {
-        let [a, b, c] = self.mesh.corners(triangle as usize);
+        let [a, b, c] = self.mesh().corners(triangle as usize);
         let [p, q, r] = small_triangle(part, self.parts(triangle as usize, reach));
         let (v, w) = if v + w > 1.0 { (1.0 - v, 1.0 - w) } else { (v, w) };
         let [v, w] = [0, 1].map(|axis| p[axis] + (q[axis] - p[axis]) * v + (r[axis] - p[axis]) * w);

@@ -42,7 +42,8 @@ impl TryFrom<SavedWounds> for Wounds {
 impl SavedWounds {
     /// Passes what the ledger itself would write of a segment.
     fn check(&self, node: u32, injury: &Injury) -> Result<(), &'static str> {
-        let is_listed = |list: &[Record], index: u32| list.get(index as usize).is_some_and(|record| record.node == node);
+        let is_listed =
+            |list: &[Record], index: u32| list.get(index as usize).is_some_and(|record| record.node == node);
         let is_stretch = |from: f32, to: f32| 0.0 <= from && from <= to && to <= 1.0;
         if injury.is_empty() {
             return Err("nothing was done to it");

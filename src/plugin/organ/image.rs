@@ -1,0 +1,123 @@
+//! From a Bevy image to the values that a tissue is read from.
+
+use crate::synthesis::{
+    pace::Pace,
+    tissue::{ImageChannel, TissueImage},
+};
+use bevy::{
+    asset::Handle,
+    color::{Color, ColorToComponents},
+    ecs::{component::Component, reflect::ReflectComponent},
+    image::{Image, TextureAccessError},
+    math::UVec3,
+    prelude::{Deref, DerefMut},
+    reflect::{Reflect, std_traits::ReflectDefault},
+};
+
+/// The image that an organ's tissue is read from, where its [`Vasculature`](crate::plugin::Vasculature) has
+/// [`TissueSource::Image`](crate::synthesis::tissue::TissueSource::Image) as tissue. The organ needs no mesh then.
+///
+/// Pictures are flat tissues; 3-D textures, and 2-D ones of several layers, are solids.
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct OrganImage(pub Handle<Image>);
+
+/// Why an image cannot be an organ.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OrganImageError {
+    /// The file is missing or broken.
+    #[error("the image asset was not loaded ({reason}); check its path")]
+    NotLoaded {
+        /// What the asset server says.
+        reason: String,
+    },
+    /// Bevy has moved the data to the graphics card.
+    #[error(
+        "the image's data are on the graphics card only; create or load it with \
+         RenderAssetUsages::MAIN_WORLD | RenderAssetUsages::RENDER_WORLD"
+    )]
+    OnGpuOnly,
+    /// The pixels cannot be read.
+    #[error("the image's pixels cannot be read ({reason}); use an uncompressed format such as R8Unorm or Rgba8UnormSrgb")]
+    Unreadable {
+        /// What Bevy says.
+        reason: String,
+    },
+}
+
+/// Reads one channel of an image, with rests. Values are as they are stored, 0 to 1 in most formats: those of an sRGB format
+/// are not made linear.
+pub(crate) async fn tissue_image(
+    image: &Image,
+    channel: ImageChannel,
+    pace: &Pace,
+) -> Result<TissueImage, OrganImageError> {
+    let size = UVec3::new(image.width(), image.height(), image.texture_descriptor.size.depth_or_array_layers);
+    let rows = size.y as usize * size.z as usize;
+    let mut values = Vec::with_capacity(rows * size.x as usize);
+    for row in 0..rows {
+        let (y, z) = (row as u32 % size.y, row as u32 / size.y);
+        for x in 0..size.x {
+            values.push(channel.of(stored(color_at(image, UVec3::new(x, y, z))?)));
+        }
+        pace.rest((row + 1) as f32 / rows as f32).await;
+    }
+    Ok(TissueImage { size, values })
+}
+
+fn color_at(image: &Image, at: UVec3) -> Result<Color, OrganImageError> {
+    let color = match image.get_color_at_3d(at.x, at.y, at.z) {
+        // So it answers for a flat picture.
+        Err(TextureAccessError::WrongDimension) => image.get_color_at(at.x, at.y),
+        other => other,
+    };
+    color.map_err(|error| match error {
+        TextureAccessError::Uninitialized => OrganImageError::OnGpuOnly,
+        other => OrganImageError::Unreadable { reason: other.to_string() },
+    })
+}
+
+/// Red, green, blue and alpha as the image stores them.
+fn stored(color: Color) -> [f32; 4] {
+    match color {
+        Color::Srgba(color) => color.to_f32_array(),
+        other => other.to_linear().to_f32_array(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::plugin::organ::image::*;
+    use crate::synthesis::pace::at_once;
+    use bevy::asset::RenderAssetUsages;
+    use bevy::image::Image;
+
+    /// The descriptor's types are not among what the plugin's features bring, so the format is that of a default image.
+    fn two_pixels() -> Image {
+        let mut image = Image::default();
+        image.texture_descriptor.size.width = 2;
+        image.data = Some(vec![255, 0, 51, 255, 0, 102, 0, 0]);
+        image.asset_usage = RenderAssetUsages::MAIN_WORLD;
+        image
+    }
+
+    fn read(image: &Image, channel: ImageChannel) -> Result<TissueImage, OrganImageError> {
+        at_once(tissue_image(image, channel, &Pace::default()))
+    }
+
+    #[test]
+    fn values_are_as_they_are_stored() {
+        let image = two_pixels();
+        let alpha = read(&image, ImageChannel::Alpha).expect("readable");
+        assert_eq!((alpha.size, alpha.values), (UVec3::new(2, 1, 1), vec![1.0, 0.0]));
+        let green = read(&image, ImageChannel::Green).expect("readable");
+        assert_eq!(green.values, [0.0, 0.4]);
+    }
+
+    #[test]
+    fn data_on_the_graphics_card_are_named() {
+        let image = Image { data: None, ..two_pixels() };
+        let error = read(&image, ImageChannel::Grey).err();
+        assert!(error.is_some_and(|error| error.to_string().contains("MAIN_WORLD")));
+    }
+}

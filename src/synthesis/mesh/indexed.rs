@@ -1,0 +1,48 @@
+//! A mesh with the index of its triangles, shared: for values that belong to its vertices and are asked for anywhere.
+
+use super::{SurfacePoint, TriangleIndex, TriangleMesh};
+use bevy_math::Vec3;
+use std::sync::Arc;
+
+/// A mesh and the index of its triangles. A clone shares both.
+#[derive(Clone, Debug)]
+pub struct IndexedMesh {
+    mesh: Arc<TriangleMesh>,
+    index: Arc<TriangleIndex>,
+}
+
+impl IndexedMesh {
+    /// Indexes a mesh.
+    pub fn new(mesh: impl Into<Arc<TriangleMesh>>) -> Self {
+        let mesh = mesh.into();
+        let index = Arc::new(TriangleIndex::new(&mesh));
+        Self { mesh, index }
+    }
+
+    /// The mesh.
+    pub fn mesh(&self) -> &TriangleMesh {
+        &self.mesh
+    }
+
+    /// The index of its triangles.
+    pub fn index(&self) -> &TriangleIndex {
+        &self.index
+    }
+
+    /// The value at a point of the mesh, given one value for each vertex: linear over each triangle.
+    ///
+    /// # Panics
+    /// When there are fewer values than vertices.
+    pub fn value_at(&self, point: &SurfacePoint, values: &[f32]) -> f32 {
+        let corners = self.mesh.triangles()[point.triangle].map(|vertex| values[vertex as usize]);
+        Vec3::from_array(corners).dot(point.barycentric)
+    }
+
+    /// The value at the point of the mesh nearest to `point`; `None` where that is not finite.
+    ///
+    /// # Panics
+    /// When there are fewer values than vertices.
+    pub fn value_near(&self, point: Vec3, values: &[f32]) -> Option<f32> {
+        self.index.closest(point).map(|found| self.value_at(&found, values))
+    }
+}

@@ -1,0 +1,142 @@
+//! A tissue with everything that takes long to prepare, kept so that paint can be laid over it again and again.
+
+use super::{
+    DensityField, DensityTissue, GuidePath, MeshSurface, MeshTissue, MeshVolume, NoGoField, NoGoTissue, Staged, Tissue,
+    TissueError, TissueMode, TissuePaint,
+};
+use crate::synthesis::{
+    mesh::{IndexedMesh, TriangleMesh},
+    pace::Pace,
+};
+use std::sync::{Arc, OnceLock};
+
+/// A tissue made from its [source](super::TissueSource), before anything is painted on it. A clone shares all of it.
+///
+/// The indices, voxels and surfaces of an organ are made once. [`painted`](Self::painted) tissues share them.
+#[derive(Clone, Debug)]
+pub struct PreparedTissue {
+    /// Tissues that are in force before the last, each for a number of steps.
+    stages: Vec<(Arc<dyn Tissue>, u32)>,
+    last: Arc<dyn Tissue>,
+    /// The tissue as it is without paint.
+    plain: Arc<dyn Tissue>,
+    /// What vertices are painted on; `None` for tissues that are not made of a mesh.
+    canvas: Option<Arc<Canvas>>,
+}
+
+/// The mesh that vertices belong to, indexed when it is first painted on.
+#[derive(Debug)]
+struct Canvas {
+    mesh: Arc<TriangleMesh>,
+    indexed: OnceLock<IndexedMesh>,
+}
+
+impl Canvas {
+    fn indexed(&self) -> &IndexedMesh {
+        self.indexed.get_or_init(|| IndexedMesh::new(Arc::clone(&self.mesh)))
+    }
+}
+
+impl PreparedTissue {
+    /// Any tissue but a mesh's: density and painted vertices have no place on it.
+    ///
+    /// # Errors
+    /// A tissue that changes in stages: paint is laid over each of them.
+    pub fn new(tissue: Arc<dyn Tissue>) -> Result<Self, TissueError> {
+        if tissue.stage(1).is_some() {
+            return Err(TissueError::PaintOverStages);
+        }
+        Ok(Self { stages: Vec::new(), last: Arc::clone(&tissue), plain: tissue, canvas: None })
+    }
+
+    /// The tissue of a mesh.
+    ///
+    /// # Errors
+    /// [`TissueError::Voxels`] and [`TissueError::NoInside`], where the inside is needed.
+    pub(super) async fn of_mesh(
+        mesh: Arc<TriangleMesh>,
+        settings: &MeshTissue,
+        _pace: &Pace,
+    ) -> Result<Self, TissueError> {
+        let indexed = OnceLock::new();
+        let surface = || -> Result<Arc<dyn Tissue>, TissueError> {
+            let surface = MeshSurface::new(Arc::clone(&mesh))?;
+            indexed.get_or_init(|| surface.indexed().clone());
+            Ok(Arc::new(surface))
+        };
+        let volume = || MeshVolume::new(&mesh, settings.resolution).map(|volume| Arc::new(volume) as Arc<dyn Tissue>);
+        let (stages, last) = match settings.mode {
+            TissueMode::Surface => (Vec::new(), surface()?),
+            TissueMode::Volume => (Vec::new(), volume()?),
+            TissueMode::Staged { surface_steps } => (vec![(surface()?, surface_steps)], volume()?),
+        };
+        let plain = in_stages(stages.clone(), Arc::clone(&last))?;
+        Ok(Self { stages, last, plain, canvas: Some(Arc::new(Canvas { mesh, indexed })) })
+    }
+
+    /// The tissue without paint.
+    pub fn tissue(&self) -> &Arc<dyn Tissue> {
+        &self.plain
+    }
+
+    /// The tissue with paint laid over it. Nothing that was prepared is prepared again. Where nothing is painted, this is
+    /// the [`tissue`](Self::tissue) itself.
+    ///
+    /// The first time that vertices of a mesh are painted whose surface is no tissue, an index of its triangles is made.
+    ///
+    /// # Errors
+    /// What is wrong with the paint: see [`TissueError`].
+    pub fn painted(&self, paint: &TissuePaint) -> Result<Arc<dyn Tissue>, TissueError> {
+        if paint.is_blank() {
+            return Ok(Arc::clone(&self.plain));
+        }
+        let density = |values| DensityField::on_indexed(self.canvas("the density")?, values);
+        let density = paint.density.as_deref().map(density).transpose()?;
+        let no_go = paint.no_go.field(|| self.canvas("a no-go region"))?;
+        let laid = |tissue: &Arc<dyn Tissue>| guarded(thinned(Arc::clone(tissue), density.as_ref())?, no_go.as_ref());
+        // Guides lie on what vessels grow on first.
+        let base = self.stages.first().map_or(&self.last, |(first, _)| first);
+        let mut stages = Vec::with_capacity(paint.guides.len() + self.stages.len());
+        for guide in &paint.guides {
+            let path = GuidePath::new(guide.points.clone(), guide.deviation)?.over(Arc::clone(base))?;
+            stages.push((guarded(Arc::new(path), no_go.as_ref())?, guide.steps));
+        }
+        for (stage, steps) in &self.stages {
+            stages.push((laid(stage)?, *steps));
+        }
+        in_stages(stages, laid(&self.last)?)
+    }
+
+    /// How much work it is to lay this paint over the tissue, in items: vertices, and triangles where their index has yet to
+    /// be made.
+    pub fn painting_work(&self, paint: &TissuePaint) -> usize {
+        let vertices = [paint.density.as_ref().map(Vec::len), paint.no_go.vertices.as_ref().map(Vec::len)];
+        let painted = vertices.iter().flatten().sum::<usize>();
+        let is_bare = |canvas: &&Arc<Canvas>| painted > 0 && canvas.indexed.get().is_none();
+        let triangles = self.canvas.as_ref().filter(is_bare).map_or(0, |canvas| canvas.mesh.triangles().len());
+        // A value costs a small part of what an item of other work does.
+        triangles + painted / 16
+    }
+
+    fn canvas(&self, what: &'static str) -> Result<&IndexedMesh, TissueError> {
+        self.canvas.as_deref().map(Canvas::indexed).ok_or(TissueError::NoVertices { what })
+    }
+}
+
+fn thinned(tissue: Arc<dyn Tissue>, density: Option<&DensityField>) -> Result<Arc<dyn Tissue>, TissueError> {
+    Ok(match density {
+        Some(field) => Arc::new(DensityTissue::new(tissue, field.clone())?),
+        None => tissue,
+    })
+}
+
+fn guarded(tissue: Arc<dyn Tissue>, no_go: Option<&NoGoField>) -> Result<Arc<dyn Tissue>, TissueError> {
+    Ok(match no_go {
+        Some(field) => Arc::new(NoGoTissue::new(tissue, field.clone())?),
+        None => tissue,
+    })
+}
+
+fn in_stages(stages: Vec<(Arc<dyn Tissue>, u32)>, last: Arc<dyn Tissue>) -> Result<Arc<dyn Tissue>, TissueError> {
+    if stages.is_empty() { Ok(last) } else { Ok(Arc::new(Staged::new(stages, last)?)) }
+}
