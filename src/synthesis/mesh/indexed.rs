@@ -1,6 +1,7 @@
 //! A mesh with the index of its triangles, shared: for values that belong to its vertices and are asked for anywhere.
 
 use super::{SurfacePoint, TriangleIndex, TriangleMesh};
+use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::Vec3;
 use std::sync::Arc;
 
@@ -14,8 +15,12 @@ pub struct IndexedMesh {
 impl IndexedMesh {
     /// Indexes a mesh.
     pub fn new(mesh: impl Into<Arc<TriangleMesh>>) -> Self {
-        let mesh = mesh.into();
-        let index = Arc::new(TriangleIndex::new(&mesh));
+        at_once(Self::new_paced(mesh.into(), &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub async fn new_paced(mesh: Arc<TriangleMesh>, pace: &Pace) -> Self {
+        let index = Arc::new(TriangleIndex::new_paced(&mesh, pace).await);
         Self { mesh, index }
     }
 

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::synthesis::{
     mesh::{IndexedMesh, TriangleMesh},
-    pace::Pace,
+    pace::{Pace, at_once},
 };
 use std::sync::{Arc, OnceLock};
 
@@ -32,6 +32,14 @@ struct Canvas {
 }
 
 impl Canvas {
+    /// Makes the index where it has yet to be made.
+    async fn index(&self, pace: &Pace) {
+        if self.indexed.get().is_none() {
+            let indexed = IndexedMesh::new_paced(Arc::clone(&self.mesh), pace).await;
+            self.indexed.get_or_init(|| indexed);
+        }
+    }
+
     fn indexed(&self) -> &IndexedMesh {
         self.indexed.get_or_init(|| IndexedMesh::new(Arc::clone(&self.mesh)))
     }
@@ -56,20 +64,26 @@ impl PreparedTissue {
     pub(super) async fn of_mesh(
         mesh: Arc<TriangleMesh>,
         settings: &MeshTissue,
-        _pace: &Pace,
+        pace: &Pace,
     ) -> Result<Self, TissueError> {
         let indexed = OnceLock::new();
-        let surface = || -> Result<Arc<dyn Tissue>, TissueError> {
-            let surface = MeshSurface::new(Arc::clone(&mesh))?;
+        let surface = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
+            let surface = MeshSurface::new_paced(Arc::clone(&mesh), &pace).await?;
             indexed.get_or_init(|| surface.indexed().clone());
             Ok(Arc::new(surface))
         };
-        let volume = || MeshVolume::new(&mesh, settings.resolution).map(|volume| Arc::new(volume) as Arc<dyn Tissue>);
-        let (stages, last) = match settings.mode {
-            TissueMode::Surface => (Vec::new(), surface()?),
-            TissueMode::Volume => (Vec::new(), volume()?),
-            TissueMode::Staged { surface_steps } => (vec![(surface()?, surface_steps)], volume()?),
+        let volume = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
+            Ok(Arc::new(MeshVolume::new_paced(&mesh, settings.resolution, &pace).await?))
         };
+        let (stages, last) = match settings.mode {
+            TissueMode::Surface => (Vec::new(), surface(pace.clone()).await?),
+            TissueMode::Volume => (Vec::new(), volume(pace.clone()).await?),
+            TissueMode::Staged { surface_steps } => {
+                let first = surface(pace.part(0.0..0.2)).await?;
+                (vec![(first, surface_steps)], volume(pace.part(0.2..1.0)).await?)
+            }
+        };
+        pace.rest(1.0).await;
         let plain = in_stages(stages.clone(), Arc::clone(&last))?;
         Ok(Self { stages, last, plain, canvas: Some(Arc::new(Canvas { mesh, indexed })) })
     }
@@ -87,8 +101,19 @@ impl PreparedTissue {
     /// # Errors
     /// What is wrong with the paint: see [`TissueError`].
     pub fn painted(&self, paint: &TissuePaint) -> Result<Arc<dyn Tissue>, TissueError> {
+        at_once(self.painted_paced(paint, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`painted`](Self::painted).
+    pub async fn painted_paced(&self, paint: &TissuePaint, pace: &Pace) -> Result<Arc<dyn Tissue>, TissueError> {
         if paint.is_blank() {
             return Ok(Arc::clone(&self.plain));
+        }
+        if let (Some(canvas), true) = (&self.canvas, paint.density.is_some() || paint.no_go.vertices.is_some()) {
+            canvas.index(&pace.part(0.0..0.5)).await;
         }
         let density = |values| DensityField::on_indexed(self.canvas("the density")?, values);
         let density = paint.density.as_deref().map(density).transpose()?;
@@ -97,13 +122,18 @@ impl PreparedTissue {
         // Guides lie on what vessels grow on first.
         let base = self.stages.first().map_or(&self.last, |(first, _)| first);
         let mut stages = Vec::with_capacity(paint.guides.len() + self.stages.len());
-        for guide in &paint.guides {
-            let path = GuidePath::new(guide.points.clone(), guide.deviation)?.over(Arc::clone(base))?;
+        let pace = pace.part(0.5..1.0);
+        for (number, guide) in paint.guides.iter().enumerate() {
+            let share = 1.0 / paint.guides.len() as f32;
+            let pace = pace.part(number as f32 * share..(number + 1) as f32 * share);
+            let path = GuidePath::new(guide.points.clone(), guide.deviation)?;
+            let path = path.over_paced(Arc::clone(base), &pace).await?;
             stages.push((guarded(Arc::new(path), no_go.as_ref())?, guide.steps));
         }
         for (stage, steps) in &self.stages {
             stages.push((laid(stage)?, *steps));
         }
+        pace.rest(1.0).await;
         in_stages(stages, laid(&self.last)?)
     }
 

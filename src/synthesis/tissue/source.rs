@@ -51,7 +51,8 @@ impl TissueSource {
             Self::Mesh(mesh) => mesh.prepare_paced(data.mesh.clone().ok_or(TissueError::NoMesh)?, pace).await,
             Self::Shape(shape) => PreparedTissue::new(shape.build()?),
             Self::Image(image) => {
-                PreparedTissue::new(Arc::new(image.mask(data.image.as_deref().ok_or(TissueError::NoImage)?)?))
+                let mask = image.mask_paced(data.image.as_deref().ok_or(TissueError::NoImage)?, pace).await?;
+                PreparedTissue::new(Arc::new(mask))
             }
         }
     }
@@ -366,15 +367,25 @@ impl ImageTissue {
     /// # Errors
     /// Values that are not one per pixel, or none that is tissue; a spacing that is not above 0; numbers that are not finite.
     pub fn mask(&self, image: &TissueImage) -> Result<Mask, TissueError> {
+        at_once(self.mask_paced(image, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`mask`](Self::mask).
+    pub async fn mask_paced(&self, image: &TissueImage, pace: &Pace) -> Result<Mask, TissueError> {
         let threshold = finite("the threshold of the image", self.threshold)?;
         // What is no number is no tissue either way.
-        let is_tissue = |&value: &f32| if self.inverted { value < threshold } else { value >= threshold };
-        let mut inside: Vec<bool> = image.values.iter().map(is_tissue).collect();
+        let is_tissue = |value: f32| if self.inverted { value < threshold } else { value >= threshold };
+        let cells = image.values.len();
+        let mut inside: Vec<bool> = pace.part(0.0..0.2).collect(cells, |cell| is_tissue(image.values[cell])).await;
+        let pace = pace.part(0.2..1.0);
         if image.size.z != 1 {
-            return Mask::voxels(image.size, self.spacing, self.origin, &inside);
+            return Mask::voxels_paced(image.size, self.spacing, self.origin, &inside, &pace).await;
         }
         upside_down(&mut inside, image.size.x as usize);
-        Mask::image(image.size.truncate(), self.spacing.truncate(), self.origin, &inside)
+        Mask::image_paced(image.size.truncate(), self.spacing.truncate(), self.origin, &inside, &pace).await
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::synthesis::{
     mesh::{IndexedMesh, SurfacePoint, TriangleIndex, TriangleMesh},
+    pace::{Pace, at_once},
     random::{VesselRng, alias_table::AliasTable, many},
     tissue::{Extent, Tissue, TissuePiece, TissuePoint, error::TissueError, pieces},
 };
@@ -37,15 +38,24 @@ impl MeshSurface {
     /// # Errors
     /// None for a [`TriangleMesh`], which is checked; the result type is that of every tissue.
     pub fn new(mesh: impl Into<Arc<TriangleMesh>>) -> Result<Self, TissueError> {
-        let indexed = IndexedMesh::new(mesh);
+        at_once(Self::new_paced(mesh, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub async fn new_paced(mesh: impl Into<Arc<TriangleMesh>>, pace: &Pace) -> Result<Self, TissueError> {
+        let indexed = IndexedMesh::new_paced(mesh.into(), &pace.part(0.0..0.5)).await;
         let mesh = indexed.mesh();
         let bounds = mesh.bounds();
-        let facing = if mesh.signed_volume() < 0.0 && mesh.is_closed() { -1.0 } else { 1.0 };
-        let mut normals = mesh.vertex_normals();
+        let faces_inwards = mesh.signed_volume() < 0.0 && mesh.topology_paced(&pace.part(0.5..0.6)).await.is_closed();
+        let facing = if faces_inwards { -1.0 } else { 1.0 };
+        let welding = mesh.weld_paced(&pace.part(0.6..0.7)).await;
+        let mut normals = mesh.vertex_normals_paced(&welding, &pace.part(0.7..0.9)).await;
         normals.iter_mut().for_each(|normal| *normal *= facing);
-        let areas: Vec<f64> = (0..mesh.triangles().len())
-            .map(|triangle| if mesh.is_degenerate(triangle) { 0.0 } else { mesh.triangle_area(triangle) })
-            .collect();
+        let area = |triangle| if mesh.is_degenerate(triangle) { 0.0 } else { mesh.triangle_area(triangle) };
+        let areas: Vec<f64> = pace.part(0.9..1.0).collect(mesh.triangles().len(), area).await;
         Ok(Self {
             normals,
             facing,
