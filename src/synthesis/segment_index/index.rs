@@ -17,10 +17,7 @@ use crate::synthesis::segment_index::{
     run::{Run, box_of, curve_through},
 };
 use crate::synthesis::{
-    space::{
-        morton::Curve,
-        packed_boxes::Pack,
-    },
+    space::{morton::Curve, packed_boxes::Pack},
     tree::{NodeId, Place, VesselTree},
 };
 use bevy_math::Vec3;
@@ -28,7 +25,7 @@ use bevy_math::Vec3;
 /// An index over the segments of one tree.
 ///
 /// A segment is known by its end node. Its box holds it with its radius, wherever the drawing may taper it from (see
-/// [`MAX_FLARE`](crate::synthesis::instances::MAX_FLARE)). Boxes are those of the last [`extend`](Self::extend) or
+/// [`MAX_FLARE`](super::MAX_FLARE)). Boxes are those of the last [`extend`](Self::extend) or
 /// refit; questions that take the tree measure it as it is.
 ///
 /// Memory: 44 bytes a segment, twice that while it is merged, counted by [`bytes`](Self::bytes).
