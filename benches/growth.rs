@@ -12,7 +12,6 @@ use bevy_vessels::synthesis::{
     roots::{RootPlacement, Roots},
     space::point_grid::PointGrid,
     tissue::{Ball, Disc, MeshSurface, Tissue},
-    tree::VesselKind,
 };
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -28,9 +27,9 @@ struct Case {
 impl Case {
     fn new(tissue: Arc<dyn Tissue>, preset: PresetName) -> Self {
         let preset = preset.load();
-        let settings = if preset.fit { preset.settings.fit(tissue.extent()) } else { preset.settings };
-        let roots = Roots { arterial: preset.arterial_roots, venous: preset.venous_roots, given: [None, None] };
-        Self { tissue, settings, roots }
+        let generator = preset.generator_for(tissue.extent());
+        let settings = generator.colonization().expect("presets colonize").clone();
+        Self { tissue, settings, roots: preset.roots() }
     }
 
     fn disc(preset: PresetName) -> Self {
@@ -48,7 +47,7 @@ impl Case {
     }
 
     fn arteries_only(mut self) -> Self {
-        self.roots.venous = RootPlacement::None;
+        self.roots.placed.vein = RootPlacement::None;
         self
     }
 
@@ -58,7 +57,7 @@ impl Case {
 }
 
 fn nodes(growth: &Colonization) -> usize {
-    VesselKind::ALL.map(|system| growth.tree(system).len()).iter().sum()
+    Colonization::KINDS.map(|kind| growth.tree(kind).len()).iter().sum()
 }
 
 /// The cases that the paper's own program was measured on, each with and without a second thread.
@@ -74,7 +73,7 @@ fn reference(criterion: &mut Criterion) {
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             group.bench_function(BenchmarkId::new(name, format!("{threads} threads")), |bencher| {
-                pool.install(|| bencher.iter_batched_ref(|| case.growth(), Growth::run, BatchSize::LargeInput));
+                pool.install(|| bencher.iter_batched_ref(|| case.growth(), Colonization::run, BatchSize::LargeInput));
             });
         }
     }
@@ -95,7 +94,7 @@ fn scale(criterion: &mut Criterion) {
         ("ball, 1M + 0.6M", ball(64_000, 0.85)),
     ];
     let colon = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/organs/colon_vhf.glb");
-    match read_mesh(&colon).map(MeshSurface::new) {
+    match load_mesh(&colon).map(MeshSurface::new) {
         Ok(Ok(colon)) => {
             let colon: Arc<dyn Tissue> = Arc::new(colon);
             let case = || Case::new(Arc::clone(&colon), PresetName::Colon);
@@ -111,7 +110,7 @@ fn scale(criterion: &mut Criterion) {
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             group.bench_function(BenchmarkId::new(name, format!("{threads} threads")), |bencher| {
-                pool.install(|| bencher.iter_batched_ref(|| case.growth(), Growth::run, BatchSize::LargeInput));
+                pool.install(|| bencher.iter_batched_ref(|| case.growth(), Colonization::run, BatchSize::LargeInput));
             });
         }
     }

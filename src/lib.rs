@@ -102,6 +102,8 @@ pub struct VesselPlugin {
     pub surgery: plugin::SurgeryPlugin,
     /// How blood flows.
     pub circulation: plugin::CirculationPlugin,
+    /// How presets are loaded.
+    pub scene: plugin::ScenePlugin,
     /// How segments are drawn: how round they are.
     #[cfg(feature = "render")]
     pub segments: render::SegmentRenderPlugin,
@@ -118,6 +120,7 @@ impl VesselPlugin {
             deformation: plugin::DeformationPlugin::in_schedule(schedule),
             surgery: plugin::SurgeryPlugin::in_schedule(schedule),
             circulation: plugin::CirculationPlugin::in_schedule(schedule),
+            scene: plugin::ScenePlugin::in_schedule(schedule),
             ..self
         }
     }
@@ -131,6 +134,7 @@ impl Plugin for VesselPlugin {
             self.deformation.clone(),
             self.surgery.clone(),
             self.circulation.clone(),
+            self.scene.clone(),
         ));
         #[cfg(feature = "render")]
         app.add_plugins(self.segments.clone());

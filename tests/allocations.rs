@@ -42,11 +42,6 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-fn roots(preset: PresetName) -> Roots {
-    let preset = preset.load();
-    Roots { arterial: preset.arterial_roots, venous: preset.venous_roots, given: [None, None] }
-}
-
 fn assert_warm(
     tissue: Arc<dyn Tissue>,
     settings: ColonizationSettings,
@@ -78,8 +73,10 @@ fn steps_of_a_growth_that_is_started_again_allocate_nothing() -> Result<(), Box<
             (disc, PresetName::Paper, 20_000),
             (ball, PresetName::ReferenceBall, 1000),
         ] {
-            let settings = ColonizationSettings { samples, ..preset.load().settings };
-            assert_warm(tissue, settings, &roots(preset), 3).map_err(|error| error.to_string())?;
+            let preset = preset.load();
+            let settings = preset.generator.colonization().expect("presets colonize").clone();
+            let settings = ColonizationSettings { samples, ..settings };
+            assert_warm(tissue, settings, &preset.roots(), 3).map_err(|error| error.to_string())?;
         }
         Ok::<(), String>(())
     })

@@ -20,9 +20,8 @@ const ON_TISSUE: f32 = 1e-5;
 /// Default settings in which one thing is changed for both systems.
 fn varied(change: impl Fn(&mut SystemSettings)) -> ColonizationSettings {
     let mut settings = ColonizationSettings { steps: STEPS, samples: SAMPLES, ..ColonizationSettings::default() };
-    for system in VesselKind::ALL {
-        change(settings.system_mut(system));
-    }
+    change(&mut settings.arterial);
+    change(&mut settings.venous);
     settings
 }
 
@@ -86,11 +85,11 @@ impl<'a> Run<'a> {
 
     fn remember(&mut self) {
         let growth = &self.growth;
-        self.before = VesselKind::ALL.map(|system| growth.tree(system).clone());
-        self.normals_before = VesselKind::ALL.map(|system| growth.normals(system).to_vec());
-        self.births_before = VesselKind::ALL.map(|system| growth.birth_steps(system).to_vec());
-        self.drains_before = VesselKind::ALL.map(|system| growth.drains_left(system));
-        self.scales = VesselKind::ALL.map(|system| growth.length_scale(system));
+        self.before = Colonization::KINDS.map(|kind| growth.tree(kind).clone());
+        self.normals_before = Colonization::KINDS.map(|kind| growth.normals(kind).to_vec());
+        self.births_before = Colonization::KINDS.map(|kind| growth.birth_steps(kind).to_vec());
+        self.drains_before = Colonization::KINDS.map(|kind| growth.drains_left(kind));
+        self.scales = Colonization::KINDS.map(|kind| growth.length_scale(kind));
     }
 
     /// One step, and everything that must hold after it.
@@ -100,13 +99,13 @@ impl<'a> Run<'a> {
         assert_eq!(report.step, done + 1);
         assert_eq!(self.growth.steps_done(), report.step);
         self.check_report(&report);
-        for system in VesselKind::ALL {
-            self.growth.tree(system).validate().unwrap_or_else(|error| panic!("{} tree: {error}", system.name()));
-            self.check_append_only(system, report.step);
-            self.check_new_segments(system);
-            self.check_radii(system);
-            self.check_tissue(system);
-            self.check_vessels(system);
+        for kind in Colonization::KINDS {
+            self.growth.tree(kind).validate().unwrap_or_else(|error| panic!("{} tree: {error}", kind.name()));
+            self.check_append_only(kind, report.step);
+            self.check_new_segments(kind);
+            self.check_radii(kind);
+            self.check_tissue(kind);
+            self.check_vessels(kind);
         }
         self.remember();
     }
@@ -114,14 +113,13 @@ impl<'a> Run<'a> {
     fn check_report(&self, report: &StepReport) {
         assert_eq!(report.sampled, self.growth.settings().samples);
         assert!(report.born <= report.sampled);
-        for system in VesselKind::ALL {
-            let of = report.system(system);
-            assert_eq!(of.first_new_node as usize, self.before[system.index()].len());
-            assert_eq!((of.first_new_node + of.new_nodes) as usize, self.growth.tree(system).len());
-            assert_eq!(of.drains_left as usize, self.growth.drains_left(system));
-            assert_eq!(self.growth.drains(system).count(), self.growth.drains_left(system));
+        let (arterial, venous) = (&report.arterial, &report.venous);
+        for (kind, of) in Colonization::KINDS.into_iter().zip([arterial, venous]) {
+            assert_eq!(of.first_new_node as usize, self.before[kind.index()].len());
+            assert_eq!((of.first_new_node + of.new_nodes) as usize, self.growth.tree(kind).len());
+            assert_eq!(of.drains_left as usize, self.growth.drains_left(kind));
+            assert_eq!(self.growth.drains(kind).count(), self.growth.drains_left(kind));
         }
-        let [arterial, venous] = report.systems;
         let [arterial_before, venous_before] = self.drains_before.map(|drains| drains as u32);
         // Written as sums, so that a count below zero cannot hide.
         assert_eq!(arterial_before + report.born, arterial.drains_left + arterial.supplied);
@@ -129,25 +127,25 @@ impl<'a> Run<'a> {
     }
 
     /// What was there is there still; every channel has one entry per node.
-    fn check_append_only(&self, system: VesselKind, step: u32) {
-        let (index, growth) = (system.index(), &self.growth);
-        let (before, now) = (&self.before[index], growth.tree(system));
+    fn check_append_only(&self, kind: VesselKind, step: u32) {
+        let (index, growth) = (kind.index(), &self.growth);
+        let (before, now) = (&self.before[index], growth.tree(kind));
         assert!(now.positions().starts_with(before.positions()), "positions changed");
         assert!(now.parents().starts_with(before.parents()), "parents changed");
-        assert!(growth.normals(system).starts_with(&self.normals_before[index]), "normals changed");
-        let births = growth.birth_steps(system);
+        assert!(growth.normals(kind).starts_with(&self.normals_before[index]), "normals changed");
+        let births = growth.birth_steps(kind);
         assert!(births.starts_with(&self.births_before[index]), "birth steps changed");
         assert!(births[before.len()..].iter().all(|&birth| birth == step), "a new node of another step");
-        assert_eq!((now.len(), now.len()), (births.len(), growth.normals(system).len()));
+        assert_eq!((now.len(), now.len()), (births.len(), growth.normals(kind).len()));
     }
 
     /// New segments are as long as a step, and leave nodes that may have another child.
-    fn check_new_segments(&self, system: VesselKind) {
-        let (growth, tree) = (&self.growth, self.growth.tree(system));
-        let settings = growth.settings().system(system);
-        let step = settings.step_length * self.scales[system.index()];
-        let first_new = self.before[system.index()].len();
-        let grown_from = self.before[system.index()].child_counts();
+    fn check_new_segments(&self, kind: VesselKind) {
+        let (growth, tree) = (&self.growth, self.growth.tree(kind));
+        let settings = growth.settings().system(kind).expect("it is grown");
+        let step = settings.step_length * self.scales[kind.index()];
+        let first_new = self.before[kind.index()].len();
+        let grown_from = self.before[kind.index()].child_counts();
         for (node, parent) in tree.segments().filter(|&(node, _)| node >= first_new) {
             let length = tree.segment_vector(node).length();
             assert!(length > 0.0, "node {node} lies on its parent");
@@ -170,9 +168,9 @@ impl<'a> Run<'a> {
     }
 
     /// Murray's law at every node, in f64 and with the powers of std; and what is said of changed radii.
-    fn check_radii(&self, system: VesselKind) {
-        let (tree, before) = (self.growth.tree(system), &self.before[system.index()]);
-        let exponent = f64::from(self.growth.settings().system(system).bifurcation_exponent);
+    fn check_radii(&self, kind: VesselKind) {
+        let (tree, before) = (self.growth.tree(kind), &self.before[kind.index()]);
+        let exponent = f64::from(self.growth.settings().system(kind).expect("it is grown").bifurcation_exponent);
         let mut sums = vec![0.0; tree.len()];
         for (node, parent) in tree.segments() {
             sums[parent] += (f64::from(tree.radii()[node]) / f64::from(tree.radii()[parent])).powf(exponent);
@@ -181,7 +179,7 @@ impl<'a> Run<'a> {
             assert!((sum - 1.0).abs() <= 1e-5, "Murray's residual at node {node} is {}", sum - 1.0);
         }
 
-        let changed = self.growth.changed_radii(system);
+        let changed = self.growth.changed_radii(kind);
         assert!(changed.windows(2).all(|pair| pair[0] > pair[1]), "changed radii are not from the tips to the roots");
         let mut upstream_of_new = vec![false; tree.len()];
         upstream_of_new[before.len()..].fill(true);
@@ -196,26 +194,26 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn check_tissue(&self, system: VesselKind) {
+    fn check_tissue(&self, kind: VesselKind) {
         let (growth, tissue) = (&self.growth, self.case.tissue.at_step(self.growth.steps_done()));
-        let step = growth.settings().system(system).step_length * self.scales[system.index()];
+        let step = growth.settings().system(kind).expect("it is grown").step_length * self.scales[kind.index()];
         let limit = if growth.settings().confine { ON_TISSUE } else { step };
         let is_surface = matches!(tissue.extent(), Extent::Area(_));
-        for node in self.before[system.index()].len()..growth.tree(system).len() {
-            let position = growth.tree(system).positions()[node];
+        for node in self.before[kind.index()].len()..growth.tree(kind).len() {
+            let position = growth.tree(kind).positions()[node];
             let nearest = tissue.closest_point(position);
             let distance = nearest.position.distance(position);
             assert!(distance <= limit, "node {node} at {position} lies {distance} beside the tissue, over {limit}");
-            let normal = growth.normals(system)[node];
+            let normal = growth.normals(kind)[node];
             let length = if is_surface { 1.0 } else { 0.0 };
             assert!((normal.length() - length).abs() < 1e-4, "node {node} has the normal {normal}");
         }
     }
 
     /// What is drawn: the tree, lifted off a surface by its radius.
-    fn check_vessels(&self, system: VesselKind) {
-        let (tree, normals) = (self.growth.tree(system), self.growth.normals(system));
-        let vessels = self.growth.vessels(system);
+    fn check_vessels(&self, kind: VesselKind) {
+        let (tree, normals) = (self.growth.tree(kind), self.growth.normals(kind));
+        let vessels = self.growth.vessels(kind);
         assert_eq!((vessels.parents(), vessels.radii()), (tree.parents(), tree.radii()));
         for (node, position) in vessels.positions().iter().enumerate() {
             let expected = tree.positions()[node] + normals[node] * tree.radii()[node];
@@ -230,7 +228,7 @@ fn grow(case: &Case, settings: &ColonizationSettings, seed: u64) -> usize {
     while !run.growth.is_finished() {
         run.step();
     }
-    VesselKind::ALL.map(|system| run.growth.tree(system).len()).iter().sum()
+    Colonization::KINDS.map(|kind| run.growth.tree(kind).len()).iter().sum()
 }
 
 #[test]

@@ -36,9 +36,10 @@ fn octants(tissue: &dyn Tissue) -> Vec<Vec<Vec3>> {
 }
 
 /// Share of the least supplied octant within two final birth distances of a node.
-fn worst(growth: &Colonization, octants: &[Vec<Vec3>], system: VesselKind) -> f32 {
-    let reach = 2.0 * growth.settings().system(system).node_birth_distance * growth.length_scale(system);
-    let shares = octants.iter().filter_map(|samples| statistics::coverage(growth.tree(system), samples, reach));
+fn worst(growth: &Colonization, octants: &[Vec<Vec3>], kind: VesselKind) -> f32 {
+    let reach =
+        2.0 * growth.settings().system(kind).expect("it is grown").node_birth_distance * growth.length_scale(kind);
+    let shares = octants.iter().filter_map(|samples| statistics::coverage(growth.tree(kind), samples, reach));
     shares.fold(1.0, f32::min)
 }
 
@@ -50,17 +51,18 @@ fn check(organs: &[&str], preset: PresetName, mode: TissueMode, least: [f32; 2])
             eprintln!("skipped: there is no {}", path.display());
             continue;
         }
-        let mesh = read_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
+        let mesh = load_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
         let mut preset = preset.load();
         preset.tissue.mode = mode;
         let tissue = preset.tissue.build(&mesh).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let octants = octants(tissue.at_step(preset.settings.steps));
+        let generator = preset.generator_for(tissue.extent());
+        let settings = generator.colonization().expect("presets colonize");
+        let octants = octants(tissue.at_step(settings.steps));
         for seed in 0..SEEDS {
-            let settings = preset.settings_for(tissue.extent());
-            let mut growth = Colonization::new(Arc::clone(&tissue), settings, &preset.roots(), seed)
+            let mut growth = Colonization::new(Arc::clone(&tissue), settings.clone(), &preset.roots(), seed)
                 .unwrap_or_else(|error| panic!("{name}: {error}"));
             growth.run();
-            let shares = VesselKind::ALL.map(|system| worst(&growth, &octants, system));
+            let shares = Colonization::KINDS.map(|kind| worst(&growth, &octants, kind));
             println!("{name}, {mode:?}, seed {seed}: {:.2} and {:.2} in the worst octant", shares[0], shares[1]);
             assert!(
                 shares[0] >= least[0] && shares[1] >= least[1],

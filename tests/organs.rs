@@ -42,7 +42,7 @@ fn organs() -> impl Iterator<Item = (String, TriangleMesh)> {
     let paths = files(folder).into_iter().chain(files(&folder.join("awkward")));
     paths.map(|path| {
         let name = path.file_stem().expect("a file name").to_string_lossy().into_owned();
-        let mesh = read_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
+        let mesh = load_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
         (name, mesh)
     })
 }
@@ -53,17 +53,17 @@ fn grow(name: &str, tissue: Arc<dyn Tissue>, steps: u32, samples: u32) -> Coloni
     let mut growth =
         Colonization::new(tissue, settings, &Roots::default(), 5).unwrap_or_else(|error| panic!("{name}: {error}"));
     growth.run();
-    for system in VesselKind::ALL {
-        let tree = growth.tree(system);
-        tree.validate().unwrap_or_else(|error| panic!("{name}, {}: {error}", system.name()));
-        let residual = tree.murray_residual(growth.settings().system(system).bifurcation_exponent);
-        assert!(residual <= 1e-5, "{name}, {}: Murray's residual is {residual}", system.name());
+    for kind in Colonization::KINDS {
+        let tree = growth.tree(kind);
+        tree.validate().unwrap_or_else(|error| panic!("{name}, {}: {error}", kind.name()));
+        let residual = tree.murray_residual(growth.settings().system(kind).expect("it is grown").bifurcation_exponent);
+        assert!(residual <= 1e-5, "{name}, {}: Murray's residual is {residual}", kind.name());
     }
     growth
 }
 
 fn nodes(growth: &Colonization) -> impl Iterator<Item = Vec3> + '_ {
-    VesselKind::ALL.into_iter().flat_map(|system| growth.tree(system).positions().iter().copied())
+    Colonization::KINDS.into_iter().flat_map(|kind| growth.tree(kind).positions().iter().copied())
 }
 
 /// Distance of a point from a triangle by its definition: the plane's foot if it lies within, else the nearest edge.

@@ -43,13 +43,13 @@ impl Measures {
         ]
     }
 
-    fn add(&mut self, growth: &Colonization, system: VesselKind, share: f64) {
-        let tree = growth.tree(system);
+    fn add(&mut self, growth: &Colonization, kind: VesselKind, share: f64) {
+        let tree = growth.tree(kind);
         let measured = tree.statistics();
-        let settings = growth.settings().system(system);
+        let settings = growth.settings().system(kind).expect("it is grown");
         let mut rng = Stream::Statistics.rng(1);
         let samples: Vec<Vec3> = (0..4000).filter_map(|_| growth.tissue().sample(&mut rng)).collect();
-        let reach = settings.node_birth_distance * growth.length_scale(system);
+        let reach = settings.node_birth_distance * growth.length_scale(kind);
         self.nodes += share * measured.nodes as f64;
         self.leaves += share * measured.leaves as f64;
         self.total_length += share * measured.total_length;
@@ -68,6 +68,11 @@ fn ball() -> Arc<dyn Tissue> {
     Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball of radius 0.5"))
 }
 
+/// The settings of a preset that grows by space colonization, as all do.
+fn settings_of(preset: &Preset) -> &ColonizationSettings {
+    preset.generator.colonization().expect("presets colonize")
+}
+
 fn grown(tissue: &Arc<dyn Tissue>, preset: &Preset, settings: &ColonizationSettings, seed: u64) -> Colonization {
     let mut growth =
         Colonization::new(Arc::clone(tissue), settings.clone(), &preset.roots(), seed).expect("valid settings");
@@ -80,9 +85,9 @@ fn measure(tissue: &Arc<dyn Tissue>, preset: &Preset, settings: &ColonizationSet
     let mut measures = [Measures::default(), Measures::default()];
     for seed in 0..seeds {
         let growth = grown(tissue, preset, settings, seed);
-        for system in VesselKind::ALL {
-            if !growth.tree(system).is_empty() {
-                measures[system.index()].add(&growth, system, 1.0 / seeds as f64);
+        for kind in Colonization::KINDS {
+            if !growth.tree(kind).is_empty() {
+                measures[kind.index()].add(&growth, kind, 1.0 / seeds as f64);
             }
         }
     }
@@ -142,7 +147,7 @@ const BALL_ARTERIES: Measures = Measures {
 #[test]
 fn the_disc_has_the_reference_statistics() {
     let preset = PresetName::ReferenceDisc.load();
-    let [arteries, veins] = measure(&disc(), &preset, &preset.settings, SEEDS);
+    let [arteries, veins] = measure(&disc(), &preset, settings_of(&preset), SEEDS);
     assert_within_ten_percent("disc, arteries", &arteries, &DISC_ARTERIES);
     assert_within_ten_percent("disc, veins", &veins, &DISC_VEINS);
 }
@@ -150,7 +155,7 @@ fn the_disc_has_the_reference_statistics() {
 #[test]
 fn the_finer_disc_has_the_reference_statistics() {
     let preset = PresetName::ReferenceDisc.load();
-    let [arteries, veins] = measure(&disc(), &preset, &preset.settings.clone().scaled(0.75), FINE_DISC_SEEDS);
+    let [arteries, veins] = measure(&disc(), &preset, &settings_of(&preset).clone().scaled(0.75), FINE_DISC_SEEDS);
     assert_within_ten_percent("disc ×0.75, arteries", &arteries, &FINE_DISC_ARTERIES);
     assert_within_ten_percent("disc ×0.75, veins", &veins, &FINE_DISC_VEINS);
 }
@@ -158,7 +163,7 @@ fn the_finer_disc_has_the_reference_statistics() {
 #[test]
 fn the_ball_has_the_reference_statistics() {
     let preset = PresetName::ReferenceBall.load();
-    let [arteries, _] = measure(&ball(), &preset, &preset.settings, SEEDS);
+    let [arteries, _] = measure(&ball(), &preset, settings_of(&preset), SEEDS);
     assert_within_ten_percent("ball, arteries", &arteries, &BALL_ARTERIES);
 }
 
@@ -166,11 +171,11 @@ fn the_ball_has_the_reference_statistics() {
 fn no_venous_tree_of_the_papers_preset_stalls() {
     let paper = PresetName::Paper.load();
     let reference_roots = PresetName::ReferenceDisc.load();
-    for preset in [&paper, &Preset { settings: paper.settings.clone(), ..reference_roots }] {
+    for preset in [&paper, &Preset { generator: paper.generator.clone(), ..reference_roots }] {
         let tissue = disc();
         let share = |tree: &VesselTree, of: &VesselTree| tree.len() as f64 / of.len() as f64;
         for seed in 0..100 {
-            let growth = grown(&tissue, preset, &preset.settings, seed);
+            let growth = grown(&tissue, preset, settings_of(preset), seed);
             let share = share(growth.tree(VesselKind::Vein), growth.tree(VesselKind::Artery));
             assert!(share >= 0.5, "seed {seed}: the venous tree has {share:.2} of the arterial nodes");
         }
@@ -180,7 +185,7 @@ fn no_venous_tree_of_the_papers_preset_stalls() {
 /// Mean angle between the daughters of a bifurcation, in degrees, and the number of leaves.
 fn variation(change: impl Fn(&mut ColonizationSettings)) -> Measures {
     let preset = PresetName::ReferenceDisc.load();
-    let mut settings = preset.settings.clone();
+    let mut settings = settings_of(&preset).clone();
     change(&mut settings);
     let [arteries, _] = measure(&disc(), &preset, &settings, SEEDS);
     arteries
@@ -209,7 +214,7 @@ fn settings_shape_the_tree_as_in_figure_5() {
 fn a_larger_direction_weight_straightens_vessels() {
     let preset = PresetName::ReferenceDisc.load();
     let turn = |weight: f32| {
-        let mut settings = preset.settings.clone();
+        let mut settings = settings_of(&preset).clone();
         settings.arterial.direction_weight = weight;
         mean_turn(grown(&disc(), &preset, &settings, 1).tree(VesselKind::Artery))
     };
@@ -231,7 +236,7 @@ fn mean_turn(tree: &VesselTree) -> f64 {
 fn a_larger_threshold_gives_more_lateral_branches() {
     let preset = PresetName::ReferenceDisc.load();
     let share = |threshold: f32| {
-        let mut settings = preset.settings.clone();
+        let mut settings = settings_of(&preset).clone();
         settings.arterial.bifurcation_threshold = threshold;
         let growth = grown(&disc(), &preset, &settings, 1);
         lateral_share(growth.tree(VesselKind::Artery), growth.birth_steps(VesselKind::Artery))

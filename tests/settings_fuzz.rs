@@ -7,7 +7,6 @@ use bevy_vessels::synthesis::{
     random::{Stream, VesselRng},
     roots::RootError,
     tissue::TissueGrowth,
-    tree::VesselKind,
 };
 use common::{Case, tissues};
 use rand::RngExt;
@@ -130,8 +129,9 @@ fn break_one(settings: &mut ColonizationSettings, rng: &mut VesselRng) -> &'stat
     match rng.random_range(0..BREAKS.len() + 2) {
         index if index < BREAKS.len() => {
             let (name, set, values) = BREAKS[index];
-            let system = VesselKind::ALL[rng.random_range(0..2)];
-            set(settings.system_mut(system), values[rng.random_range(0..values.len())]);
+            let systems = [&mut settings.arterial, &mut settings.venous];
+            let system = systems.into_iter().nth(rng.random_range(0..2)).expect("one of two");
+            set(system, values[rng.random_range(0..values.len())]);
             name
         }
         index if index == BREAKS.len() => {
@@ -170,16 +170,16 @@ fn grow(cases: &[Case], seed: u64) -> Option<usize> {
     };
     while !growth.is_finished() {
         let report = growth.step();
-        for system in VesselKind::ALL {
-            let tree = growth.tree(system);
+        for (kind, of) in Colonization::KINDS.into_iter().zip([&report.arterial, &report.venous]) {
+            let tree = growth.tree(kind);
             tree.validate().unwrap_or_else(|error| {
                 let settings = growth.settings();
-                panic!("{} tree in {} after step {}: {error}\n{settings:?}", system.name(), case.name, report.step)
+                panic!("{} tree in {} after step {}: {error}\n{settings:?}", kind.name(), case.name, report.step)
             });
-            assert_eq!(report.system(system).drains_left as usize, growth.drains_left(system));
+            assert_eq!(of.drains_left as usize, growth.drains_left(kind));
         }
     }
-    Some(VesselKind::ALL.map(|system| growth.vessels(system).len()).iter().sum())
+    Some(Colonization::KINDS.map(|kind| growth.vessels(kind).len()).iter().sum())
 }
 
 #[test]

@@ -35,7 +35,8 @@ use std::{
 /// Where work is done that takes longer than a frame: tissues, indices, networks and bindings of large organs.
 ///
 /// Changes concern work that begins later; a new [`slice_time`](Self::slice_time) also what is under way.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub struct JobSettings {
     /// Who does large work.
@@ -71,7 +72,7 @@ impl Default for JobSettings {
 }
 
 /// Who does work that is too large to be done at once.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum JobMode {
     /// The task pool where it has threads of its own; in a browser, slices.

@@ -16,6 +16,7 @@
 //! | [`DeformationPlugin`] | `deformation` | deformed organs → moved [`Vessels`] |
 //! | [`SurgeryPlugin`] | `surgery` | [`CuttableVessels`], [`VesselCommand`]s → [`VesselWounds`], [`OpenEnd`] entities |
 //! | [`CirculationPlugin`] | `circulation` | [`VesselWounds`] → flow, bleeding, supply of the tissue |
+//! | [`ScenePlugin`] | `scene` | [`PresetAsset`]s → [`Vasculature`]; what is kept of an organ that is saved |
 //! | [`VesselsPlugin`] | `vessels` | what all of them need; they add it themselves |
 
 mod announcer;
@@ -25,6 +26,7 @@ mod growth;
 mod job;
 mod order;
 mod organ;
+mod scene;
 mod surgery;
 mod vessels;
 
@@ -41,6 +43,7 @@ pub use growth::{
 pub use job::{JobMode, JobSettings};
 pub use order::VesselSystems;
 pub use organ::{OrganMeshError, RestMesh, triangle_mesh};
+pub use scene::{PresetAsset, PresetLoadError, PresetLoader, ScenePlugin, VesselPreset};
 pub use surgery::{
     Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, Stroke, StrokeId,
     SurgeryPlugin, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,

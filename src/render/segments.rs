@@ -85,7 +85,8 @@ impl SegmentBuffer {
 }
 
 /// An entity that draws one chunk of segments. For reading: its mesh follows its size in the picture.
-#[derive(Component, Debug)]
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component, Clone, Debug)]
 pub struct SegmentChunk {
     /// Radius of the thickest segment, in the local space of the vessel entity.
     pub(super) thickest: f32,
@@ -155,12 +156,17 @@ impl Look {
 /// Gives every new vessel entity an empty buffer and a material.
 pub(super) fn attach_buffers(
     mut commands: Commands,
-    new: Query<(Entity, &Vessels), Without<SegmentBuffer>>,
+    new: Query<(Entity, &Vessels, Option<&Children>), Without<SegmentBuffer>>,
+    chunks: Query<(), With<SegmentChunk>>,
     templates: Res<VesselMaterials>,
     mut buffers: ResMut<Assets<ShaderBuffer>>,
     mut materials: ResMut<Assets<SegmentMaterial>>,
 ) {
-    for (entity, vessels) in &new {
+    for (entity, vessels, children) in &new {
+        // Those that came with a scene or a clone draw nothing.
+        for &stray in children.into_iter().flatten().filter(|&&child| chunks.contains(child)) {
+            commands.entity(stray).try_despawn();
+        }
         let (capacity, stumps) = (FEWEST_SLOTS, Stumps::default());
         let bytes = (capacity + stumps.room()) * SegmentInstance::SIZE;
         let mut buffer = ShaderBuffer::with_size(bytes, RenderAssetUsages::default());

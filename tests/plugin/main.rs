@@ -9,8 +9,12 @@ mod desktop;
 mod entities;
 mod errors;
 mod growth;
+mod observers;
 mod operating_field;
 mod picking;
+mod presets;
+mod registry;
+mod scene;
 mod units;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};

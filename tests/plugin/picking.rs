@@ -51,8 +51,8 @@ fn any_point(rng: &mut VesselRng) -> Vec3 {
     Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
 }
 
-fn any_ray(rng: &mut VesselRng) -> Ray3d {
-    let (from, to) = (3.0 * any_point(rng), any_point(rng));
+fn any_ray(to: Vec3, rng: &mut VesselRng) -> Ray3d {
+    let from = 3.0 * any_point(rng);
     Ray3d::new(from, Dir3::new(to - from).expect("points at random are apart"))
 }
 
@@ -108,6 +108,12 @@ fn twins(app: &mut App) -> Vec<Twin> {
 }
 
 impl Twin {
+    /// Where some node is in the world.
+    fn any_node(&self, rng: &mut VesselRng) -> Vec3 {
+        let node = rng.random_range(0..self.tree.len());
+        self.to_world.transform_point3(self.tree.positions()[node].as_dvec3()).as_vec3()
+    }
+
     /// Nodes with their parents, and what is left of their segments.
     fn segments(&self) -> impl Iterator<Item = (usize, usize, &[f64; 2])> {
         self.tree.segments().flat_map(|(node, parent)| self.pieces[node].iter().map(move |piece| (node, parent, piece)))
@@ -193,7 +199,8 @@ fn check_questions(app: &mut App, questions: &Questions, rng: &mut VesselRng, co
     let of = |found: &VesselPlace| twins.iter().find(|twin| twin.entity == found.vessels).expect("a twin of each");
     let mut found = [0; 2];
     for question in 0..count {
-        let (point, reach) = (1.5 * any_point(rng), rng.random_range(0.0..0.3));
+        let near = twins[rng.random_range(0..twins.len())].any_node(rng) + 0.05 * any_point(rng);
+        let (point, reach) = (near, rng.random_range(0.0..0.1));
         let what = format!("{what}, question {question}");
         let nearest = twins.iter().map(|twin| twin.nearest(point)).fold(f64::INFINITY, f64::min);
         match questions.nearest(app, point, reach) {
@@ -204,7 +211,7 @@ fn check_questions(app: &mut App, questions: &Questions, rng: &mut VesselRng, co
             }
             None => assert!(nearest > f64::from(reach) - ROOM, "{what}: nothing, not {nearest} within {reach}"),
         }
-        let (ray, reach) = (any_ray(rng), rng.random_range(0.0..6.0));
+        let (ray, reach) = (any_ray(near, rng), rng.random_range(0.0..8.0));
         // What may be met, and what must be.
         let [may, must] = [-1e-5, 1e-5]
             .map(|shrunk| twins.iter().map(|twin| twin.first(ray, reach.into(), shrunk)).fold(f64::INFINITY, f64::min));
@@ -224,7 +231,7 @@ fn check_questions(app: &mut App, questions: &Questions, rng: &mut VesselRng, co
 #[test]
 fn all_organs_are_searched_cuttable_or_not() {
     let mut found = [0; 2];
-    for seed in 0..4 {
+    for seed in 0..2 {
         let mut rng = Stream::Statistics.rng(seed);
         let mut app = timed_app(FRAME);
         let questions = Questions::new(&mut app);
@@ -234,7 +241,7 @@ fn all_organs_are_searched_cuttable_or_not() {
         for organ in [whole, cut_up] {
             app.world_mut().entity_mut(organ).insert(any_transform(&mut rng));
         }
-        let before = check_questions(&mut app, &questions, &mut rng, 60, &format!("seed {seed}, whole"));
+        let before = check_questions(&mut app, &questions, &mut rng, 50, &format!("seed {seed}, whole"));
         for _ in 0..8 {
             let ball = Blade::ball(any_point(&mut rng), 0.3).expect("a ball");
             let plane = square(any_point(&mut rng), any_point(&mut rng), 4.0);
@@ -242,16 +249,16 @@ fn all_organs_are_searched_cuttable_or_not() {
         }
         let severed = wounds(app.world(), cut_up, VesselKind::PortalVein).severed_segments().count();
         assert!(severed > 20, "{severed} of 250 are severed");
-        let after = check_questions(&mut app, &questions, &mut rng, 60, &format!("seed {seed}, cut up"));
+        let after = check_questions(&mut app, &questions, &mut rng, 50, &format!("seed {seed}, cut up"));
         for organ in [whole, cut_up] {
             app.world_mut().entity_mut(organ).insert(any_transform(&mut rng));
         }
-        let moved = check_questions(&mut app, &questions, &mut rng, 60, &format!("seed {seed}, moved"));
+        let moved = check_questions(&mut app, &questions, &mut rng, 50, &format!("seed {seed}, moved"));
         for counts in [before, after, moved] {
             found = [found[0] + counts[0], found[1] + counts[1]];
         }
     }
-    assert!(found.iter().all(|count| (100..620).contains(count)), "{found:?} of 720 are too few or too many to tell");
+    assert!(found.iter().all(|count| (80..290).contains(count)), "{found:?} of 300 are too few or too many to tell");
 }
 
 #[test]
@@ -275,15 +282,15 @@ fn answers_are_complete_while_vessels_move_and_a_large_index_is_under_way() {
         });
         update(&mut app, entity, &tree);
         for _ in 0..3 {
-            let ray = any_ray(&mut rng);
+            let aim = tree.positions()[rng.random_range(0..tree.len())] + 0.02 * any_point(&mut rng);
+            let ray = any_ray(aim, &mut rng);
             let expected = SegmentIndex::new(&tree).first_hit(&tree, ray.origin, *ray.direction, 10.0);
             let found = questions.ray(&mut app, ray, 10.0);
             let (place, distance) = expected.unzip();
             assert_eq!(found.map(|found| found.place), place, "{} indexed", indexed(&app, entity));
             assert!(found.map(|found| (found.distance - distance.unwrap()).abs()).unwrap_or(0.0) < 1e-6);
-            let point = any_point(&mut rng);
-            let found = questions.nearest(&mut app, point, 0.05).map(|found| found.place);
-            assert_eq!(found, nearest_of(&tree, point, 0.05), "{} indexed", indexed(&app, entity));
+            let found = questions.nearest(&mut app, aim, 0.05).map(|found| found.place);
+            assert_eq!(found, nearest_of(&tree, aim, 0.05), "{} indexed", indexed(&app, entity));
         }
         if indexed(&app, entity) == tree.len() {
             break;

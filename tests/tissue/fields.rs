@@ -2,7 +2,10 @@
 
 use super::{Outcome, assert_closest, assert_moments, ball_soup, grid, in_cube, rng, samples};
 use bevy_math::{UVec2, UVec3, Vec2, Vec3};
-use bevy_vessels::synthesis::{mesh::TriangleMesh, tissue::*};
+use bevy_vessels::synthesis::{
+    mesh::{TriangleMesh, VoxelError},
+    tissue::*,
+};
 use std::sync::Arc;
 
 #[test]

@@ -8,7 +8,7 @@ use bevy_math::{
     bounding::{Aabb3d, BoundingVolume},
 };
 use bevy_vessels::synthesis::{
-    mesh::TriangleMesh,
+    mesh::{TriangleIndex, TriangleMesh},
     random::{Stream, VesselRng},
     tissue::*,
 };

@@ -32,32 +32,47 @@ use bevy::{
         lifecycle::Remove,
         observer::On,
         query::{QueryData, With},
+        reflect::ReflectComponent,
         system::{Commands, Query},
         world::{EntityWorldMut, Ref},
     },
     log::warn,
+    reflect::{Reflect, ReflectDeserialize, ReflectSerialize, std_traits::ReflectDefault},
     tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
 };
+use serde::{Deserialize, Serialize};
 
 /// Nodes whose networks are made within a frame; those of more are made beside the frames.
 pub(crate) const AT_ONCE: usize = 8192;
 
 /// The flow in an organ's vessels. The plugin drives it.
-#[derive(Component, Debug, Default)]
+///
+/// Scenes and clones of the organ keep how far its open ends have clotted. All else is made anew.
+#[derive(Component, Debug, Default, Reflect, Serialize, Deserialize)]
+#[reflect(opaque, Component, Default, Clone, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct CirculationState {
     /// The vessels that the flow is of, or will be when it is made.
+    #[serde(skip)]
     made_for: Option<MadeFor>,
     /// How they are perfused, paused or not.
+    #[serde(skip)]
     made_with: Option<Perfusion>,
+    #[serde(skip)]
     task: Option<Task<Result<OrganFlow, FlowError>>>,
+    #[serde(skip)]
     pub(crate) flow: Option<OrganFlow>,
     pub(crate) bleeding: ByKind<Bleeding>,
     /// Open ends in the order of the networks'.
+    #[serde(skip)]
     pub(crate) ends: ByKind<Vec<FlowingEnd>>,
     /// Whether the gaps have to be laid anew.
+    #[serde(skip)]
     pub(crate) is_unlaid: bool,
     /// How the supply is measured, once the vessels have grown.
+    #[serde(skip)]
     pub(crate) gauge: Gauge,
+    #[serde(skip)]
     error: Option<FlowError>,
 }
 
@@ -67,6 +82,20 @@ struct MadeFor {
     lineages: ByKind<Lineage>,
     nodes: ByKind<usize>,
     is_grown: bool,
+}
+
+/// What scenes keep.
+impl Clone for CirculationState {
+    fn clone(&self) -> Self {
+        Self { bleeding: self.bleeding.clone().map(|_, bleeding| bleeding.resumed()), ..Self::default() }
+    }
+}
+
+impl MadeFor {
+    /// Whether some of its vessels have given way to others.
+    fn is_replaced_by(&self, now: &Self) -> bool {
+        VesselKind::ALL.into_iter().any(|kind| self.nodes[kind] > 0 && self.lineages[kind] != now.lineages[kind])
+    }
 }
 
 impl CirculationState {
@@ -184,7 +213,7 @@ impl PerfusedOrganItem<'_, '_> {
 
     /// Begins to make a flow: at once where that is quick. Large trees wait until they have grown.
     fn begin(&mut self, made_for: MadeFor, vessels: &Query<Perfused>, messages: &mut BleedingMessages) {
-        let is_other = self.state.made_for.is_none_or(|before| before.lineages != made_for.lineages);
+        let is_other = self.state.made_for.is_some_and(|before| before.is_replaced_by(&made_for));
         self.state.made_for = Some(made_for);
         self.state.task = None;
         self.state.error = None;

@@ -1,13 +1,18 @@
 //! The blood of one patient, whom several organs may share.
 
 use crate::synthesis::haemodynamics::{BloodVolume, BloodVolumeSettings, FlowError};
-use bevy::ecs::{component::Component, entity::Entity, hierarchy::ChildOf, system::Query};
+use bevy::{
+    ecs::{component::Component, entity::Entity, hierarchy::ChildOf, reflect::ReflectComponent, system::Query},
+    reflect::{Reflect, ReflectDeserialize, ReflectSerialize, std_traits::ReflectDefault},
+};
 
 /// The blood of one patient: whose loss lowers the pressure in all organs.
 ///
 /// Put it on an organ, or on an entity above several organs, which then share it. An organ that finds none on itself or
 /// above gets one of its own, with the default settings. To fill a patient up again, insert a new one.
-#[derive(Component, Clone, Copy, Debug, PartialEq)]
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
+#[reflect(opaque, Component, Default, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct Patient {
     pub(crate) blood: BloodVolume,
 }

@@ -26,8 +26,9 @@ use bevy::{
     },
     math::Vec3,
     mesh::{Mesh, Mesh3d},
-    reflect::{Reflect, std_traits::ReflectDefault},
+    reflect::{Reflect, ReflectDeserialize, ReflectSerialize, std_traits::ReflectDefault},
 };
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Lets an organ's vessels follow its mesh: put it beside the organ's [`Vasculature`](crate::plugin::Vasculature), and
@@ -77,12 +78,40 @@ pub struct FollowsMesh;
 /// # bevy::ecs::system::assert_is_system(sag);
 /// # assert!(tetrahedra().is_ok());
 /// ```
-#[derive(Component, Clone, Debug)]
+#[derive(Component, Clone, Debug, Reflect, Serialize, Deserialize)]
+#[reflect(opaque, Component, Clone, Debug, Serialize, Deserialize)]
+#[serde(into = "SavedTetrahedra", try_from = "SavedTetrahedra")]
 #[require(RestMesh)]
 pub struct FollowsTetrahedra {
     rest: Arc<TetMesh>,
     lineage: Lineage,
     positions: Vec<Vec3>,
+}
+
+/// [`FollowsTetrahedra`] in a file.
+#[derive(Serialize, Deserialize)]
+#[serde(rename = "FollowsTetrahedra", deny_unknown_fields)]
+struct SavedTetrahedra {
+    rest: TetMesh,
+    positions: Vec<Vec3>,
+}
+
+impl From<FollowsTetrahedra> for SavedTetrahedra {
+    fn from(follows: FollowsTetrahedra) -> Self {
+        Self { rest: Arc::unwrap_or_clone(follows.rest), positions: follows.positions }
+    }
+}
+
+impl TryFrom<SavedTetrahedra> for FollowsTetrahedra {
+    type Error = String;
+
+    fn try_from(saved: SavedTetrahedra) -> Result<Self, String> {
+        let (vertices, positions) = (saved.rest.positions().len(), saved.positions.len());
+        if vertices != positions {
+            return Err(format!("tetrahedra of {vertices} vertices have {positions} positions; give one for each"));
+        }
+        Ok(Self { positions: saved.positions, ..Self::new(saved.rest) })
+    }
 }
 
 impl FollowsTetrahedra {

@@ -30,6 +30,9 @@ pub(crate) fn grow(
 ) {
     let start = Instant::now();
     let mut steps = 0;
+    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.is_in_arrears()) {
+        steps += catch_up(&mut state, &mut progress);
+    }
     for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.finish) {
         steps += run_to_end(&mut state, &mut progress);
     }
@@ -86,6 +89,15 @@ fn settle(state: &mut GrowthState, progress: &mut GrowthProgress) {
     let cost = start.elapsed();
     state.note_settling(cost);
     progress.grow_time += cost;
+}
+
+/// Does the steps again that an organ had done when it was saved, and says how many they were.
+fn catch_up(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
+    let start = Instant::now();
+    let before = progress.step;
+    state.catch_up();
+    *progress = GrowthProgress::of(GrowthPhase::Growing, state.growth(), progress.grow_time + start.elapsed());
+    progress.step - before
 }
 
 /// Does all remaining steps of an organ that has its tissue, and says how many they were.

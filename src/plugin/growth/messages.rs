@@ -108,6 +108,12 @@ pub enum OrganGrowthError {
     /// Its mesh gives no tissue of the kind that is asked for.
     #[error(transparent)]
     Tissue(#[from] TissueError),
+    /// Its preset could not be loaded.
+    #[error("the preset cannot be loaded: {reason}")]
+    Preset {
+        /// What is wrong, with the file.
+        reason: String,
+    },
     /// Its settings or roots are no start for a growth.
     #[error(transparent)]
     Generator(#[from] GeneratorError),

@@ -35,7 +35,7 @@ use bevy::{
 pub(crate) struct PublishedVessels {
     vessels: &'static mut Vessels,
     changes: &'static mut ChangeLog,
-    aabb: &'static mut Aabb,
+    aabb: Option<&'static mut Aabb>,
 }
 
 /// Brings the vessel entities up to date with the growths. Spawns those that are missing.
@@ -103,7 +103,9 @@ impl PublishedVesselsItem<'_, '_> {
         let (grown, changed) = state.news(kind);
         self.vessels.follow(grown, state.lineage(kind), changed, &mut self.changes);
         let aabb = self.vessels.aabb();
-        self.aabb.set_if_neq(aabb);
+        if let Some(known) = &mut self.aabb {
+            known.set_if_neq(aabb);
+        }
     }
 }
 

@@ -201,6 +201,7 @@ impl OrganItem<'_, '_> {
     /// Takes note of changed wishes.
     pub(crate) fn follow(&mut self) {
         let mesh = self.mesh.map(|mesh| mesh.id());
+        self.state.bypass_change_detection().resume(self.progress.step);
         if self.wish.is_changed() || self.state.follows_other_mesh(mesh) {
             self.state.follow(&self.wish, mesh);
         }

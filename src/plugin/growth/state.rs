@@ -52,6 +52,8 @@ pub struct GrowthState {
     error: Option<OrganGrowthError>,
     /// Warnings that have been given for the settings.
     warned: Vec<GrowthWarning>,
+    /// Steps that the growth had done when its organ was saved, and does again at once.
+    arrears: u32,
     /// Steps that a paused growth may still do.
     granted: u32,
     /// Whether all remaining steps are to be done at once.
@@ -106,6 +108,7 @@ impl GrowthState {
                 return GrowthControl::Paused;
             }
             GrowthAction::Restart => {
+                self.arrears = 0;
                 self.granted = 0;
                 self.finish = false;
                 self.demand(Need::Growth);
@@ -119,9 +122,24 @@ impl GrowthState {
     pub(crate) fn follow(&mut self, vasculature: &Vasculature, mesh: Option<AssetId<Mesh>>) {
         let need = difference(self.followed.as_ref(), vasculature, mesh);
         if need != Need::Nothing {
+            if self.followed.as_ref().is_some_and(|(before, _)| before != vasculature) {
+                self.arrears = 0;
+            }
             self.followed = Some((vasculature.clone(), mesh));
             self.demand(need);
         }
+    }
+
+    /// Takes note of how far the growth of an organ was that comes from a scene or is a clone.
+    pub(crate) fn resume(&mut self, steps: u32) {
+        if self.followed.is_none() {
+            self.arrears = steps;
+        }
+    }
+
+    /// Whether there are steps to be done again at once.
+    pub(crate) fn is_in_arrears(&self) -> bool {
+        self.arrears > 0 && self.growth.is_some()
     }
 
     /// Whether the growth follows another mesh asset than this one.
@@ -300,6 +318,15 @@ impl GrowthState {
     /// What the next step is expected to cost.
     pub(crate) fn expected_cost(&self) -> StepCost {
         StepCost { step: self.costs.steps.expected(), publish: self.costs.publishing.expected() }
+    }
+
+    /// Does the steps again that were done before the organ was saved.
+    pub(crate) fn catch_up(&mut self) {
+        for _ in 0..std::mem::take(&mut self.arrears) {
+            let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { break };
+            growth.advance();
+        }
+        self.settle();
     }
 
     /// Does all remaining steps.

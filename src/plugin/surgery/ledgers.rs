@@ -49,21 +49,32 @@ pub struct Cuttable {
 pub(crate) fn attach_wounds(
     mut commands: Commands,
     organs: Query<&OrganVessels, With<Cuttable>>,
-    bare: Query<&VesselIndex, (With<Vessels>, Without<VesselWounds>)>,
+    bare: Query<&VesselIndex, (With<Vessels>, Or<(Without<VesselWounds>, Without<OpenEndEntities>)>)>,
 ) {
     for &entity in organs.iter().flat_map(|vessels| vessels.entities()) {
         let Ok(index) = bare.get(entity) else { continue };
         index.prepare();
-        commands.entity(entity).insert((VesselWounds::default(), OpenEndEntities::default()));
+        // Vessels from a scene have a ledger already.
+        commands.entity(entity).insert_if_new((VesselWounds::default(), OpenEndEntities::default()));
     }
 }
 
-/// Cut: vessels that grew anew have no wounds.
+/// Cut: vessels that grew anew have no wounds, but for those that they were saved with.
 pub(crate) fn clear_outdated(
     mut vessels: Query<(Entity, &Vessels, &mut VesselWounds)>,
     mut door: ResMut<CuttableVessels>,
 ) {
     for (entity, vessels, mut wounds) in &mut vessels {
+        if let Some(saved) = wounds.saved() {
+            if vessels.tree().is_empty() {
+                continue;
+            }
+            if vessels.is_as_saved() && saved.fits(vessels.tree()) {
+                wounds.resume(vessels);
+                continue;
+            }
+            warn!("{entity}: its wounds are dropped: these are other vessels than those that it was saved with");
+        }
         if !wounds.is_of(vessels) {
             door.bypass_change_detection().forget(entity);
             if wounds.is_empty() {

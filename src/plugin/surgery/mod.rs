@@ -58,6 +58,7 @@ impl Plugin for SurgeryPlugin {
             .add_observer(ledgers::remove_wounds)
             .add_observer(ledgers::forget_ledger);
         let cut = (
+            open_ends::despawn_strays,
             ledgers::attach_wounds,
             ledgers::clear_outdated,
             ledgers::follow_settings,

@@ -17,7 +17,7 @@ use bevy::{
         component::Component,
         entity::Entity,
         hierarchy::{ChildOf, Children},
-        query::{Changed, Or},
+        query::{Added, Changed, Or},
         reflect::ReflectComponent,
         system::{Commands, Query},
         world::EntityWorldMut,
@@ -55,8 +55,10 @@ use std::collections::{BTreeMap, BTreeSet};
 #[require(Transform, Visibility)]
 pub struct OpenEnd {
     /// The organ.
+    #[entities]
     pub organ: Entity,
     /// The vessel entity.
+    #[entities]
     pub vessels: Entity,
     /// What kind of vessel it is an end of.
     pub kind: VesselKind,
@@ -134,6 +136,20 @@ impl OpenEndEntities {
     /// All ends, in the order in which they were made.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (EndId, Entity)> + '_ {
         self.0.iter().map(|(&end, &entity)| (end, entity))
+    }
+}
+
+/// Cut: open ends that came with a scene or a clone go; those of the vessels there are spawned with their wounds.
+pub(crate) fn despawn_strays(
+    mut commands: Commands,
+    new: Query<(Entity, &OpenEnd), Added<OpenEnd>>,
+    vessels: Query<&OpenEndEntities>,
+) {
+    for (entity, end) in &new {
+        let is_known = vessels.get(end.vessels).is_ok_and(|entities| entities.get(end.id) == Some(entity));
+        if !is_known {
+            commands.entity(entity).try_despawn();
+        }
     }
 }
 

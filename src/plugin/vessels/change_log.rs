@@ -46,8 +46,39 @@ pub struct ChangeLog {
     all: u32,
     /// Revision of each node's last change, 0 for none.
     stamps: Vec<[u32; 64]>,
-    /// Largest of each 64 stamps.
-    latest: Vec<u32>,
+    /// What the stamps say together, which is enough for most readers.
+    words: Vec<Word>,
+}
+
+/// What the stamps of 64 nodes say together.
+#[derive(Clone, Copy, Debug, Default)]
+struct Word {
+    /// The largest stamp.
+    latest: u32,
+    /// At least as large as all others.
+    before: u32,
+    /// The nodes that have the largest stamp.
+    newest: u64,
+}
+
+impl Word {
+    fn mark(&mut self, place: usize, revision: u32) {
+        if self.latest != revision {
+            *self = Self { latest: revision, before: self.latest, newest: 0 };
+        }
+        self.newest |= 1 << place;
+    }
+
+    /// The nodes whose stamps are above a revision. A reader that has seen all but the last change needs no stamps.
+    fn newer(&self, stamps: &[u32; 64], seen: u32) -> u64 {
+        if self.latest <= seen {
+            0
+        } else if self.before <= seen {
+            self.newest
+        } else {
+            newer(stamps, seen)
+        }
+    }
 }
 
 /// How far a reader of a [`ChangeLog`] has read. The default has seen nothing, so that everything counts as changed.
@@ -63,8 +94,8 @@ pub struct ChangeCursor {
 impl ChangeCursor {
     /// What changed since this cursor last read, and moves the cursor to the present.
     ///
-    /// The cost is that of a glance at 64 nodes at a time, and of a comparison for each node of those words in which
-    /// something changed.
+    /// The cost is that of a glance at 64 nodes at a time, and of a comparison for each of those 64 where more than one
+    /// change is to be read.
     #[must_use = "the cursor has moved on: what changed is told once"]
     pub fn read(&mut self, log: &ChangeLog) -> Changes {
         let seen = std::mem::replace(self, log.now());
@@ -87,12 +118,12 @@ impl ChangeLog {
         self.begin_revision();
         for node in nodes {
             let (word, place) = (node / 64, node % 64);
-            if word >= self.latest.len() {
+            if word >= self.words.len() {
                 self.stamps.resize(word + 1, [0; 64]);
-                self.latest.resize(word + 1, 0);
+                self.words.resize(word + 1, Word::default());
             }
             self.stamps[word][place] = self.revision;
-            self.latest[word] = self.revision;
+            self.words[word].mark(place, self.revision);
         }
     }
 
@@ -130,11 +161,9 @@ impl ChangeLog {
         if seen.log != self.id || seen.revision < self.all {
             return Changes::ALL;
         }
-        let changed = |latest: &u32| *latest > seen.revision;
-        let end = self.latest.iter().rposition(changed).map_or(0, |last| last + 1);
-        let words = self.latest[..end].iter().zip(&self.stamps);
-        let words = words.map(|(latest, stamps)| if changed(latest) { newer(stamps, seen.revision) } else { 0 });
-        Changes::of_words(words.collect())
+        let end = self.words.iter().rposition(|word| word.latest > seen.revision).map_or(0, |last| last + 1);
+        let words = self.words[..end].iter().zip(&self.stamps);
+        Changes::of_words(words.map(|(word, stamps)| word.newer(stamps, seen.revision)).collect())
     }
 }
 
@@ -146,7 +175,7 @@ impl Default for ChangeLog {
             revision: 0,
             all: 0,
             stamps: Vec::new(),
-            latest: Vec::new(),
+            words: Vec::new(),
         }
     }
 }

@@ -19,6 +19,7 @@ pub(crate) mod index;
 pub(crate) mod lineage;
 pub(crate) mod pick;
 pub(crate) mod relations;
+mod saved;
 pub(crate) mod tree;
 pub(crate) mod wounds;
 
@@ -69,6 +70,7 @@ impl Plugin for VesselsPlugin {
         app.add_systems(
             self.schedule,
             (
+                relations::mend_relations.before(VesselSystems::Source),
                 (appearance::show_kinds, tree::mark_replaced).in_set(VesselSystems::Publish),
                 index::index_vessels.after(VesselSystems::Follow).before(VesselSystems::Cut),
             ),

@@ -1,7 +1,15 @@
 //! Which vessels are whose: the relation of vessel entities to their organ.
 
 use bevy::{
-    ecs::{component::Component, entity::Entity, reflect::ReflectComponent},
+    ecs::{
+        change_detection::DetectChanges,
+        component::Component,
+        entity::Entity,
+        hierarchy::{ChildOf, Children},
+        query::Added,
+        reflect::ReflectComponent,
+        system::{Commands, Query},
+    },
     reflect::{Reflect, std_traits::ReflectDefault},
 };
 
@@ -21,5 +29,36 @@ impl OrganVessels {
     /// The vessel entities.
     pub fn entities(&self) -> &[Entity] {
         &self.0
+    }
+}
+
+/// Mends the relations of organs that came with a scene or are clones.
+///
+/// A scene may hold an organ without its vessels, whose entities are none then. And where Bevy clones what is related in two
+/// ways, as an organ and its vessels are, it maps one of them to entities that never are.
+pub(crate) fn mend_relations(
+    mut organs: Query<(Entity, &mut OrganVessels)>,
+    new_vessels: Query<(Entity, &VesselsOf, Option<&ChildOf>), Added<VesselsOf>>,
+    vessels: Query<&VesselsOf>,
+    parents: Query<&Children>,
+    mut commands: Commands,
+) {
+    for (organ, mut entities) in organs.iter_mut().filter(|(_, entities)| entities.is_added()) {
+        let is_its = |entity: &Entity| vessels.get(*entity).is_ok_and(|of| of.0 == organ);
+        if !entities.0.iter().all(is_its) {
+            entities.0.retain(is_its);
+        }
+    }
+    for (entity, organ, parent) in &new_vessels {
+        if let Ok((_, mut entities)) = organs.get_mut(organ.0)
+            && !entities.0.contains(&entity)
+        {
+            entities.0.push(entity);
+        }
+        if let Some(parent) = parent.map(ChildOf::parent)
+            && parents.get(parent).is_ok_and(|children| !children.contains(&entity))
+        {
+            commands.entity(entity).insert(ChildOf(parent));
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The tree of a vessel entity, kept up to date with a growth at the cost of what changed.
 
-use crate::plugin::vessels::{change_log::ChangeLog, lineage::Lineage};
+use crate::plugin::vessels::{change_log::ChangeLog, lineage::Lineage, saved::clone_as_saved};
 use crate::synthesis::{
     binding::{Binding, BindingError},
     growth::GrownTree,
@@ -8,16 +8,23 @@ use crate::synthesis::{
 };
 use bevy::{
     camera::{primitives::Aabb, visibility::Visibility},
-    ecs::{component::Component, lifecycle::HookContext, query::Changed, system::Query, world::DeferredWorld},
+    ecs::{
+        component::Component, lifecycle::HookContext, query::Changed, reflect::ReflectComponent, system::Query,
+        world::DeferredWorld,
+    },
     math::Vec3,
+    reflect::{Reflect, ReflectDeserialize, ReflectSerialize},
     transform::components::Transform,
 };
 use std::borrow::Cow;
 
 /// The vessels of one kind of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
 /// off its surface where the settings say so.
-#[derive(Component, Clone, Debug)]
-#[component(on_insert = mark_inserted)]
+///
+/// Scenes and clones of the entity keep a given tree, but not one that grew: that grows again from mesh, settings and seed.
+#[derive(Component, Clone, Debug, Reflect)]
+#[component(on_insert = mark_inserted, clone_behavior = Custom(clone_as_saved))]
+#[reflect(opaque, Component, Clone(Vessels::as_saved), Debug, PartialEq, Serialize, Deserialize)]
 #[require(ChangeLog, Transform, Visibility)]
 pub struct Vessels {
     kind: VesselKind,
@@ -33,6 +40,10 @@ pub struct Vessels {
     widest_radius: f32,
     /// Positions at rest, while the organ is deformed.
     rest: Option<Vec<Vec3>>,
+    /// Whether the tree is that of a growth.
+    is_grown: bool,
+    /// Hash of the tree that they were saved with.
+    saved_hash: Option<u64>,
 }
 
 impl Vessels {
@@ -48,6 +59,8 @@ impl Vessels {
             bounds: None,
             widest_radius: 0.0,
             rest: None,
+            is_grown: true,
+            saved_hash: None,
         }
     }
 
@@ -58,7 +71,7 @@ impl Vessels {
     /// [`update_from_tree`](Self::update_from_tree) keeps what goes on. Nodes beyond the end of `birth_steps` count as
     /// born in step 0.
     pub fn from_tree(kind: VesselKind, tree: &VesselTree, birth_steps: &[u32]) -> Self {
-        let mut vessels = Self { lineage: Lineage::new_one(), ..Self::new(kind) };
+        let mut vessels = Self { lineage: Lineage::new_one(), is_grown: false, ..Self::new(kind) };
         for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
             vessels.push(position, tree.parents()[node], radius, birth_steps.get(node).copied().unwrap_or(0));
         }
@@ -115,6 +128,26 @@ impl Vessels {
         self.lineage
     }
 
+    /// Whether the tree is that of a growth, and not a given one.
+    pub(crate) fn is_grown(&self) -> bool {
+        self.is_grown
+    }
+
+    /// Hash of the tree at rest, or of the one that was saved, until it has grown again.
+    pub(crate) fn hash(&self) -> Option<u64> {
+        if self.tree.is_empty() { self.saved_hash } else { Some(self.tree_at_rest().hash64()) }
+    }
+
+    /// Takes note of the tree that they were saved with.
+    pub(crate) fn awaiting(self, saved_hash: Option<u64>) -> Self {
+        Self { saved_hash, ..self }
+    }
+
+    /// Whether the tree is the one that they were saved with.
+    pub(crate) fn is_as_saved(&self) -> bool {
+        !self.tree.is_empty() && self.saved_hash == self.hash()
+    }
+
     /// The step in which each node was born, 0 for roots.
     pub fn birth_steps(&self) -> &[u32] {
         &self.birth_steps
@@ -139,6 +172,7 @@ impl Vessels {
         log: &mut ChangeLog,
     ) {
         let changed = changed.filter(|_| self.lineage == lineage && log.is_of(lineage));
+        self.is_grown = true;
         if changed.is_none() {
             self.clear();
             self.lineage = lineage;

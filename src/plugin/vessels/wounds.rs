@@ -11,7 +11,11 @@ use crate::{
         wound::{ClampId, WoundReport, Wounds},
     },
 };
-use bevy::ecs::component::Component;
+use bevy::{
+    ecs::{component::Component, reflect::ReflectComponent},
+    reflect::{Reflect, ReflectDeserialize, ReflectSerialize, std_traits::ReflectDefault},
+};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::{collections::BTreeSet, ops::Deref};
 
 /// All that was done to the vessels of a vessel entity. For reading, as a [`Wounds`]: operate through
@@ -19,11 +23,17 @@ use std::{collections::BTreeSet, ops::Deref};
 ///
 /// Changed only in frames in which something was done. The segments that an action changed are marked in the entity's
 /// [`ChangeLog`].
-#[derive(Component, Debug, Default)]
+///
+/// Scenes and clones of the entity keep it, but for the history of undo. There it is empty until the vessels are there, too;
+/// and it stays empty, with a warning, where these are others than those that it was saved with.
+#[derive(Component, Debug, Default, Reflect)]
+#[reflect(opaque, Component, Default, Clone, Debug, Serialize, Deserialize)]
 pub struct VesselWounds {
     wounds: Wounds,
     lineage: Lineage,
     clamps: BTreeSet<ClampId>,
+    /// What was done to the vessels that are still to grow again.
+    saved: Option<Box<Wounds>>,
 }
 
 impl VesselWounds {
@@ -60,6 +70,31 @@ impl VesselWounds {
         self.lineage = vessels.lineage();
         self.wounds.clear();
         self.clamps.clear();
+        self.saved = None;
+    }
+
+    /// What was done to the vessels that the ledger was saved with, while it waits for them.
+    pub(crate) fn saved(&self) -> Option<&Wounds> {
+        self.saved.as_deref()
+    }
+
+    /// Takes up what was done to the vessels before they were saved, now that they are there again.
+    pub(crate) fn resume(&mut self, vessels: &Vessels) {
+        let Some(mut saved) = self.saved.take() else { return };
+        // Those of the ledger at hand are within their limits: they follow the organ's settings.
+        saved.set_retraction(self.wounds.retraction()).ok();
+        self.lineage = vessels.lineage();
+        self.clamps = saved.clamps().collect();
+        self.wounds = *saved;
+    }
+
+    /// What a file keeps.
+    fn kept(&self) -> Wounds {
+        self.saved.as_deref().unwrap_or(&self.wounds).without_history()
+    }
+
+    fn waiting(kept: Wounds) -> Self {
+        Self { saved: (!kept.is_empty()).then(|| Box::new(kept)), ..Self::default() }
     }
 }
 
@@ -68,5 +103,24 @@ impl Deref for VesselWounds {
 
     fn deref(&self) -> &Wounds {
         &self.wounds
+    }
+}
+
+/// A clone waits for the vessels of its own entity, and has no history.
+impl Clone for VesselWounds {
+    fn clone(&self) -> Self {
+        Self::waiting(self.kept())
+    }
+}
+
+impl Serialize for VesselWounds {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.kept().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for VesselWounds {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Wounds::deserialize(deserializer).map(Self::waiting)
     }
 }

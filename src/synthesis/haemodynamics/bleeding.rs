@@ -7,6 +7,8 @@
 //! for the whole step: second order in the step, and the loss is the time integral of the reported flow exactly. A long
 //! step is made of shorter ones, so that a fast heart is followed and a simulator may skip minutes.
 
+#[cfg(feature = "serialize")]
+use crate::synthesis::haemodynamics::saved::SavedBleeding;
 use crate::synthesis::haemodynamics::{BloodVolume, Clotting};
 use crate::synthesis::haemodynamics::{Circulation, EndSide, FlowError, Network, NetworkEnd, RootPressure};
 use crate::synthesis::tree::NodeId;
@@ -49,6 +51,7 @@ impl Default for BleedingSettings {
 
 /// How an open end is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum EndState {
     /// Blood leaves it.
@@ -61,6 +64,8 @@ pub enum EndState {
 
 /// One open end as it bleeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct BleedingEnd {
     /// End node of the severed segment.
@@ -84,8 +89,10 @@ pub struct BleedingEnd {
     /// Radius of its hole before clotting, in tissue lengths. A later cut makes another hole.
     radius: f32,
     /// Loss during this step, in m³.
+    #[cfg_attr(feature = "serialize", serde(skip))]
     lost_in_step: f64,
     /// Whether it bled before this step.
+    #[cfg_attr(feature = "serialize", serde(skip))]
     bled: bool,
 }
 
@@ -132,17 +139,19 @@ pub struct BleedingChange {
 ///
 /// To undo, keep a clone: it holds a hundred bytes for each open end, and nothing of the tree.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(into = "SavedBleeding", try_from = "SavedBleeding"))]
 pub struct Bleeding {
-    settings: BleedingSettings,
+    pub(super) settings: BleedingSettings,
     /// In the order of the network's open ends.
-    ends: Vec<BleedingEnd>,
+    pub(super) ends: Vec<BleedingEnd>,
     changes: Vec<BleedingChange>,
     /// Seconds since the beginning.
-    time: f64,
+    pub(super) time: f64,
     /// Loss of all ends that there ever were, in m³.
-    lost: f64,
+    pub(super) lost: f64,
     /// Flow of all ends in the last part of a step, in m³/s.
-    rate: f64,
+    pub(super) rate: f64,
     /// The same, as a mean over the last step.
     mean_rate: f64,
 }
@@ -234,6 +243,17 @@ impl Bleeding {
     /// The settings it was made with.
     pub fn settings(&self) -> &BleedingSettings {
         &self.settings
+    }
+
+    /// The same, to go on with in another world or with other listeners: ends that bleed are dry until the next step, which
+    /// tells that they bleed.
+    #[must_use]
+    pub fn resumed(mut self) -> Self {
+        self.changes.clear();
+        for end in self.ends.iter_mut().filter(|end| end.state == EndState::Bleeding) {
+            end.state = EndState::Dry;
+        }
+        self
     }
 
     /// Begins a step: takes over new ends and drops closed ones. Returns in how many parts the step is to be made.

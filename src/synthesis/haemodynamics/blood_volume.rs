@@ -8,6 +8,8 @@
 //! 45 % are lost fast (Guyton & Hall, Textbook of Medical Physiology, chapter on circulatory shock). The parabola
 //! between is ours. Refilling from tissue takes hours and is left out.
 
+#[cfg(feature = "serialize")]
+use crate::synthesis::haemodynamics::saved::SavedBlood;
 use crate::synthesis::{haemodynamics::FlowError, units::Volume};
 
 /// Settings of a patient's blood.
@@ -77,6 +79,8 @@ impl Default for BloodVolumeSettings {
 
 /// The blood of one patient, which all bleeding organs share.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(into = "SavedBlood", try_from = "SavedBlood"))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct BloodVolume {
     settings: BloodVolumeSettings,
@@ -92,6 +96,11 @@ impl BloodVolume {
     pub fn new(settings: BloodVolumeSettings) -> Result<Self, FlowError> {
         settings.validate()?;
         Ok(Self { settings, lost: 0.0 })
+    }
+
+    /// The settings it was made with.
+    pub fn settings(&self) -> &BloodVolumeSettings {
+        &self.settings
     }
 
     /// What all wounds together have lost.

@@ -49,6 +49,8 @@ mod joined;
 mod network;
 mod open_ends;
 mod quotient;
+#[cfg(feature = "serialize")]
+mod saved;
 mod settings;
 mod side;
 mod skeleton;

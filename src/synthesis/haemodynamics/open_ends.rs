@@ -11,6 +11,7 @@ use std::ops::Range;
 
 /// Which end of a gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum EndSide {
     /// The end towards the root: it bleeds what the root drives.

@@ -52,10 +52,29 @@ pub enum TetMeshError {
 
 /// Tetrahedra that fill an organ, as a soft body has them, checked by [`new`](Self::new).
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize), serde(try_from = "TetMeshArrays"))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct TetMesh {
     positions: Vec<Vec3>,
     tetrahedra: Vec<[u32; 4]>,
+}
+
+/// Tetrahedra that were read from a file, before they are checked.
+#[cfg(feature = "serialize")]
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TetMeshArrays {
+    positions: Vec<Vec3>,
+    tetrahedra: Vec<[u32; 4]>,
+}
+
+#[cfg(feature = "serialize")]
+impl TryFrom<TetMeshArrays> for TetMesh {
+    type Error = TetMeshError;
+
+    fn try_from(arrays: TetMeshArrays) -> Result<Self, TetMeshError> {
+        Self::new(arrays.positions, arrays.tetrahedra)
+    }
 }
 
 impl TetMesh {

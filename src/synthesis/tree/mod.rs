@@ -23,6 +23,7 @@ pub use validate::TreeError;
 
 /// A node of a [`VesselTree`], and the segment that ends in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct NodeId(pub u32);
 
@@ -41,11 +42,32 @@ pub const NO_PARENT: u32 = u32::MAX;
 /// Positions and radii are in tissue lengths. A parent always stands before its children: `parents[i] < i`, so a
 /// reverse loop runs from the tips to the roots and a forward loop from the roots to the tips.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize), serde(try_from = "TreeArrays"))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct VesselTree {
     positions: Vec<Vec3>,
     parents: Vec<u32>,
     radii: Vec<f32>,
+}
+
+/// A tree that was read from a file, before it is checked.
+#[cfg(feature = "serialize")]
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TreeArrays {
+    positions: Vec<Vec3>,
+    parents: Vec<u32>,
+    radii: Vec<f32>,
+}
+
+#[cfg(feature = "serialize")]
+impl TryFrom<TreeArrays> for VesselTree {
+    type Error = TreeError;
+
+    fn try_from(arrays: TreeArrays) -> Result<Self, TreeError> {
+        let TreeArrays { positions, parents, radii } = arrays;
+        Self::from_arrays(positions, parents, radii)
+    }
 }
 
 impl VesselTree {

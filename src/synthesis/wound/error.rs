@@ -49,6 +49,14 @@ pub enum WoundError {
         /// The value found.
         calibre: f32,
     },
+    /// A ledger in a file that says what no action could have done.
+    #[error("the ledger of wounds is broken at node {node}: {what}; save it again, or leave it out")]
+    BrokenLedger {
+        /// The node.
+        node: u32,
+        /// What is wrong.
+        what: &'static str,
+    },
     /// A setting of the retraction that is negative or not finite.
     #[error("{what} of the retraction is {value}; it must be finite and at least 0")]
     Retraction {

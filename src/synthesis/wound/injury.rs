@@ -10,6 +10,7 @@ use crate::synthesis::haemodynamics::EndSide;
 
 /// A severed end, by its index in the ledger.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Tip {
     pub end: u32,
     /// Whether the lumen is closed for good.
@@ -18,6 +19,7 @@ pub(super) struct Tip {
 
 /// A stretch of the segment where there is no vessel.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Gap {
     pub from: f32,
     pub to: f32,
@@ -34,6 +36,7 @@ impl Gap {
 
 /// What closes the lumen.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum ClosureKind {
     /// A clamp, by its index in the ledger.
     Clamp(u32),
@@ -44,6 +47,7 @@ pub(super) enum ClosureKind {
 
 /// A stretch of a piece that carries no blood; without length but for seals.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Closure {
     pub from: f32,
     pub to: f32,
@@ -64,6 +68,7 @@ pub(super) struct End {
 
 /// All that has happened to a segment.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Injury {
     gaps: Vec<Gap>,
     /// In the order of `from`.

@@ -5,6 +5,8 @@ use crate::synthesis::tree::{NodeId, Place, VesselTree};
 use crate::synthesis::wound::blade::Shape;
 use crate::synthesis::wound::crossing::{Severed, segment, severed, within};
 use crate::synthesis::wound::injury::{ClosureKind, End, Injury, NO_INJURY};
+#[cfg(feature = "serialize")]
+use crate::synthesis::wound::saved::SavedWounds;
 use crate::synthesis::wound::withdrawal::Plan;
 use crate::synthesis::{
     segment_index::{Region, SegmentSearch},
@@ -21,23 +23,26 @@ use std::{collections::BTreeMap, ops::Range};
 /// region, as [`SegmentIndex::candidates_in`](super::SegmentIndex::candidates_in) does. A cut asks more of it, which the
 /// same closure answers: see [`SegmentSearch`].
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(into = "SavedWounds", try_from = "SavedWounds"))]
 pub struct Wounds {
-    retraction: Retraction,
+    pub(super) retraction: Retraction,
     /// By node. None of them is empty.
-    injuries: BTreeMap<u32, Injury>,
-    ends: Vec<Record>,
-    clamps: Vec<Record>,
+    pub(super) injuries: BTreeMap<u32, Injury>,
+    pub(super) ends: Vec<Record>,
+    pub(super) clamps: Vec<Record>,
     journal: Vec<Action>,
     /// What the segments touched by the journal's actions were before, in order.
     before: Vec<(u32, Injury)>,
-    generation: u32,
+    pub(super) generation: u32,
     hits: Vec<Severed>,
 }
 
 /// An end or a clamp that was made, in the order of making.
 #[derive(Clone, Copy, Debug)]
-struct Record {
-    node: u32,
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Record {
+    pub(super) node: u32,
     generation: u32,
 }
 
@@ -256,6 +261,25 @@ impl Wounds {
         let closures = self.injuries.get(&record.node)?.closures();
         let found = closures.iter().find(|closure| closure.kind == ClosureKind::Clamp(clamp.index))?;
         Some(Place::new(NodeId(record.node), found.from))
+    }
+
+    /// The clamps that are on, in the order of their nodes.
+    pub fn clamps(&self) -> impl Iterator<Item = ClampId> + '_ {
+        let id = |index: u32| ClampId { index, generation: self.clamps[index as usize].generation };
+        self.injuries.values().flat_map(Injury::clamps).map(id)
+    }
+
+    /// Whether every segment that something was done to is one of a tree's, so that this may be the ledger of that tree.
+    pub fn fits(&self, tree: &VesselTree) -> bool {
+        self.injuries.keys().all(|&node| segment(tree, NodeId(node)).is_some())
+    }
+
+    /// What was done, without what it takes to undo it.
+    #[must_use]
+    pub fn without_history(&self) -> Self {
+        let Self { retraction, generation, .. } = *self;
+        let (injuries, ends, clamps) = (self.injuries.clone(), self.ends.clone(), self.clamps.clone());
+        Self { retraction, generation, injuries, ends, clamps, ..Self::default() }
     }
 
     /// The segments that anything was done to, in the order of their nodes.

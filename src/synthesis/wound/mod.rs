@@ -51,6 +51,8 @@ mod ledger;
 mod pieces;
 mod report;
 mod retraction;
+#[cfg(feature = "serialize")]
+mod saved;
 mod withdrawal;
 
 pub use crate::synthesis::haemodynamics::EndSide;

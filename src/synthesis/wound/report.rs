@@ -7,7 +7,8 @@ use bevy_math::Vec3;
 /// A severed end of a vessel. Stays the same while the end exists, through clamps, seals, and the undoing of what took
 /// it away; never given to another end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(Clone, Hash, PartialEq))]
 pub struct EndId {
     /// Place in the ledger's list.
     pub index: u32,
@@ -17,6 +18,7 @@ pub struct EndId {
 
 /// A clamp on a vessel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct ClampId {
     /// Place in the ledger's list.

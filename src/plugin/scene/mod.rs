@@ -1,0 +1,84 @@
+//! Scenes: presets as assets, and what is kept of an organ that is saved.
+//!
+//! # Presets
+//!
+//! [`PresetAsset`] is a [`Preset`](crate::synthesis::preset::Preset) from a file that ends in `.vessels.ron`. An organ with a
+//! [`VesselPreset`] gets its [`Vasculature`](crate::plugin::Vasculature) from there, again whenever the file changes.
+//!
+//! # Organs that are saved
+//!
+//! An organ that Bevy saves in a scene, or clones, keeps all that cannot be made anew. Save its vessel entities with it:
+//!
+//! | component | what is kept |
+//! |---|---|
+//! | settings, such as [`Vasculature`](crate::plugin::Vasculature) and [`Perfusion`](crate::plugin::Perfusion) | everything |
+//! | [`GrowthProgress`](crate::plugin::GrowthProgress) | how many steps are done at once after loading, as by [`GrowthAction::Finish`](crate::plugin::GrowthAction::Finish) |
+//! | [`Vessels`](crate::plugin::Vessels) that grew | their kind, and a hash: they grow again from mesh, settings and seed |
+//! | [`Vessels`](crate::plugin::Vessels) of a [given tree](crate::plugin::Vessels::from_tree) | everything, at rest |
+//! | [`VesselWounds`](crate::plugin::VesselWounds) | everything but the history of undo; undoing all still heals them |
+//! | [`CirculationState`](crate::plugin::CirculationState) | how far open ends have clotted |
+//! | [`Patient`](crate::plugin::Patient), [`BloodLoss`](crate::plugin::BloodLoss) | everything |
+//! | [`OpenEnd`](crate::plugin::OpenEnd) entities | nothing: they are spawned anew from the wounds |
+//!
+//! Wounds belong to their tree. Where the tree that grew again is another one, since the mesh or the settings changed, they
+//! are dropped with a warning. A mesh that was not loaded from a file is not in a scene: give the organ its `Mesh3d` again.
+
+use crate::plugin::{
+    growth::GrowthPlugin,
+    order::{self, VesselSystems},
+};
+use bevy::{
+    app::{App, Plugin, Update},
+    asset::{AssetApp, AssetServer, Assets},
+    ecs::{
+        intern::Interned,
+        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::resource_exists},
+    },
+};
+
+pub(crate) mod organ_preset;
+pub(crate) mod preset_asset;
+
+pub use organ_preset::VesselPreset;
+pub use preset_asset::{PresetAsset, PresetLoadError, PresetLoader};
+
+/// Loads presets as assets, and gives organs with a [`VesselPreset`] their vessels. Adds the [`GrowthPlugin`].
+///
+/// Add it after `AssetPlugin`; without that no presets are loaded.
+#[derive(Clone, Debug)]
+pub struct ScenePlugin {
+    schedule: Interned<dyn ScheduleLabel>,
+}
+
+impl ScenePlugin {
+    /// Runs in another schedule than `Update`.
+    #[must_use]
+    pub fn in_schedule(schedule: impl ScheduleLabel) -> Self {
+        Self { schedule: schedule.intern() }
+    }
+}
+
+impl Default for ScenePlugin {
+    fn default() -> Self {
+        Self::in_schedule(Update)
+    }
+}
+
+impl Plugin for ScenePlugin {
+    fn build(&self, app: &mut App) {
+        if !app.is_plugin_added::<GrowthPlugin>() {
+            app.add_plugins(GrowthPlugin::default().in_schedule(self.schedule));
+        }
+        order::configure(app, self.schedule);
+        if !app.world().contains_resource::<AssetServer>() {
+            return;
+        }
+        app.init_asset::<PresetAsset>().register_asset_reflect::<PresetAsset>().register_asset_loader(PresetLoader);
+        app.add_systems(
+            self.schedule,
+            organ_preset::follow_presets
+                .before(VesselSystems::Source)
+                .run_if(resource_exists::<Assets<PresetAsset>>),
+        );
+    }
+}

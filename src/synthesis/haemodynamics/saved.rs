@@ -1,0 +1,93 @@
+//! Bleeding and blood as they are written to files.
+
+use crate::synthesis::{
+    haemodynamics::{Bleeding, BleedingEnd, BleedingSettings, BloodVolume, BloodVolumeSettings, FlowError},
+    units::Volume,
+};
+
+/// [`Bleeding`] in a file.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(rename = "Bleeding", deny_unknown_fields)]
+pub(super) struct SavedBleeding {
+    settings: BleedingSettings,
+    ends: Vec<BleedingEnd>,
+    time: f64,
+    lost: f64,
+    rate: f64,
+}
+
+impl From<Bleeding> for SavedBleeding {
+    fn from(bleeding: Bleeding) -> Self {
+        let Bleeding { settings, ends, time, lost, rate, .. } = bleeding;
+        Self { settings, ends, time, lost, rate }
+    }
+}
+
+impl TryFrom<SavedBleeding> for Bleeding {
+    type Error = FlowError;
+
+    fn try_from(saved: SavedBleeding) -> Result<Self, FlowError> {
+        let SavedBleeding { settings, ends, time, lost, rate } = saved;
+        FlowError::check_finite("the time of the bleeding in s", time)?;
+        FlowError::check_finite("the loss of the bleeding in m³", lost)?;
+        FlowError::check_finite("the rate of the bleeding in m³/s", rate)?;
+        for end in &ends {
+            FlowError::check_finite("the age of an open end in s", end.age)?;
+            FlowError::check_finite("the loss of an open end in mL", end.lost.ml())?;
+        }
+        let mut bleeding = Self::new(settings)?;
+        (bleeding.ends, bleeding.time, bleeding.lost, bleeding.rate) = (ends, time, lost, rate);
+        Ok(bleeding.resumed())
+    }
+}
+
+/// [`BloodVolume`] in a file.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(rename = "BloodVolume", default, deny_unknown_fields)]
+#[derive(Default)]
+pub(super) struct SavedBlood {
+    settings: BloodVolumeSettings,
+    lost: Volume,
+}
+
+impl From<BloodVolume> for SavedBlood {
+    fn from(blood: BloodVolume) -> Self {
+        Self { settings: *blood.settings(), lost: blood.lost() }
+    }
+}
+
+impl TryFrom<SavedBlood> for BloodVolume {
+    type Error = FlowError;
+
+    fn try_from(saved: SavedBlood) -> Result<Self, FlowError> {
+        let mut blood = Self::new(saved.settings)?;
+        FlowError::check_finite("the lost blood in mL", saved.lost.ml())?;
+        blood.lose(saved.lost);
+        Ok(blood)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::synthesis::haemodynamics::{Bleeding, BloodVolume};
+
+    #[test]
+    fn blood_survives_a_file_and_nonsense_is_refused() {
+        let mut blood = BloodVolume::new(Default::default()).expect("the defaults");
+        blood.lose(crate::synthesis::units::Volume::from_ml(1234.5));
+        let text = ron::to_string(&blood).expect("blood can be written");
+        assert_eq!(ron::from_str::<BloodVolume>(&text), Ok(blood));
+        for nonsense in ["(settings: (total: (-1.0)))", "(lost: (NaN))", "(litres: 5)"] {
+            assert!(ron::from_str::<BloodVolume>(nonsense).is_err(), "{nonsense}");
+        }
+    }
+
+    #[test]
+    fn bleeding_is_read_with_settings_within_their_limits_only() {
+        let text = ron::to_string(&Bleeding::default()).expect("bleeding can be written");
+        assert!(ron::from_str::<Bleeding>(&text).is_ok(), "{text}");
+        let never_ends = text.replace("longest_step:0.05", "longest_step:0.0");
+        assert_ne!(text, never_ends);
+        assert!(ron::from_str::<Bleeding>(&never_ends).is_err());
+    }
+}
