@@ -118,7 +118,8 @@ fn every_file_is_in_the_lines_of_its_own_room() {
     let rooms = words_of_rooms(rooms);
     for source in files("src") {
         let file = Path::new(&source).with_extension("");
-        let parts: Vec<String> = file.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
+        let parts: Vec<String> =
+            file.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
         let own = rooms.iter().filter(|(room, _)| parts.starts_with(room)).max_by_key(|(room, _)| room.len());
         let (room, words) = own.unwrap_or_else(|| panic!("{source}: ARCHITECTURE.md has no room for it"));
         for part in &parts[room.len()..] {
