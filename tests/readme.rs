@@ -112,17 +112,55 @@ fn the_rooms_of_the_architecture_exist() {
 }
 
 #[test]
-fn every_room_is_in_the_picture() {
+fn every_file_is_in_the_lines_of_its_own_room() {
     let page = read("ARCHITECTURE.md");
     let rooms = page.split("## Rooms").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("a list of rooms");
-    let named: Vec<&str> = rooms.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    let rooms = words_of_rooms(rooms);
     for source in files("src") {
-        let room = Path::new(&source).with_extension("");
-        for part in room.components().skip(1).map(|part| part.as_os_str().to_string_lossy()) {
-            let known = matches!(&*part, "mod" | "tests") || named.contains(&&*part);
-            assert!(known, "{source}: the picture in ARCHITECTURE.md does not show {part}");
+        let file = Path::new(&source).with_extension("");
+        let parts: Vec<String> =
+            file.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
+        let own = rooms.iter().filter(|(room, _)| parts.starts_with(room)).max_by_key(|(room, _)| room.len());
+        let (room, words) = own.unwrap_or_else(|| panic!("{source}: ARCHITECTURE.md has no room for it"));
+        for part in &parts[room.len()..] {
+            let known = matches!(part.as_str(), "mod" | "tests") || words.contains(part);
+            assert!(known, "{source}: the lines of {} in ARCHITECTURE.md do not name {part}", room.join("/"));
         }
     }
+}
+
+/// The rooms of a listing by their paths, each with the words of its own lines. Lines that begin no room go on with the
+/// last one.
+fn words_of_rooms(listing: &str) -> Vec<(Vec<String>, Vec<String>)> {
+    /// Columns in which a room may begin; what lies further in goes on with a room.
+    const DEEPEST: usize = 4;
+    let mut open: Vec<(usize, String)> = Vec::new();
+    let mut rooms: Vec<(Vec<String>, Vec<String>)> = Vec::new();
+    for line in listing.lines() {
+        let name = line.split_whitespace().next().unwrap_or_default();
+        let name = name.trim_end_matches('/').trim_end_matches(".rs");
+        let column = line.len() - line.trim_start().len();
+        let is_name = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+        if is_name && column <= DEEPEST {
+            open.retain(|&(outer, _)| outer < column);
+            open.push((column, name.to_owned()));
+            rooms.push((open.iter().map(|(_, name)| name.clone()).collect(), Vec::new()));
+        }
+        if let Some((_, words)) = rooms.last_mut() {
+            let found = line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty());
+            words.extend(found.map(str::to_owned));
+        }
+    }
+    rooms
+}
+
+#[test]
+fn a_word_of_another_room_names_no_file() {
+    let rooms = words_of_rooms("src/\n  a/      one · two\n          three\n  b       four\n");
+    let names = |room: &[(Vec<String>, Vec<String>)], at: usize| (room[at].0.join("/"), room[at].1.join(" "));
+    assert_eq!(rooms.len(), 3);
+    assert_eq!(names(&rooms, 1), ("src/a".to_owned(), "a one two three".to_owned()));
+    assert_eq!(names(&rooms, 2), ("src/b".to_owned(), "b four".to_owned()));
 }
 
 /// Every file below a folder of the project, as a path with `/` from the project's root.

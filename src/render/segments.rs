@@ -219,7 +219,7 @@ pub(super) struct SegmentStore<'w, 's> {
 #[query_data(mutable)]
 pub(super) struct DrawnVessels {
     entity: Entity,
-    vessels: &'static Vessels,
+    vessels: Ref<'static, Vessels>,
     organ: &'static VesselsOf,
     log: &'static ChangeLog,
     wounds: Option<&'static VesselWounds>,
@@ -244,12 +244,13 @@ pub(super) fn update_segments(
             Some(appearance) => Look::new(&appearance, drawn.vessels.kind()),
             None => Look::new(&VesselAppearance::default(), drawn.vessels.kind()),
         };
-        let (vessels, segments) = (drawn.vessels, &mut *drawn.segments);
+        let (vessels, segments) = (&*drawn.vessels, &mut *drawn.segments);
         let nodes = vessels.tree().len();
         let supply = drawn.supply.as_ref().map_or(&[][..], |supply| &supply.segments[..]);
         let mut changes = segments.drawn.read(drawn.log);
-        segments.adopt(look, vessels, supply, &mut changes);
         let wounds = drawn.wounds.map(|wounds| &**wounds);
+        segments.stumps.note(wounds, vessels, drawn.vessels.is_changed(), &mut changes);
+        segments.adopt(look, vessels, supply, &mut changes);
         segments.stumps.update(wounds, vessels, &segments.colors, &changes, nodes);
         let len = store.drawable(drawn.entity, nodes, segments);
         store.resize(segments, len);

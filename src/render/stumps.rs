@@ -5,7 +5,7 @@
 //! Growth's rule stands: slot `i` of the buffer belongs to node `i`. A severed segment shows its first piece there, and one
 //! whose round end would hide the gap of another is shown flat. Its
 //! further pieces have slots behind those of all nodes, in chunks of their own, with their own boxes. A cut, like its
-//! undoing, writes the slots of its segments and no others.
+//! undoing, writes the slots of its segments, of those beside them that look otherwise then, and no others.
 
 use super::{
     detail::FEWEST_SLOTS,
@@ -15,9 +15,9 @@ use super::{
 use crate::{
     plugin::{Changes, Vessels},
     synthesis::{
-        instances::{SegmentColors, SegmentInstance},
+        instances::{FlatEnds, SegmentColors, SegmentInstance, write_stumps_of},
         tree::NodeId,
-        wound::{Wounds, write_stumps_of},
+        wound::Wounds,
     },
 };
 use bevy::prelude::*;
@@ -26,6 +26,8 @@ use std::{collections::BTreeMap, ops::Range};
 /// The severed segments of one vessel entity, as they are drawn.
 #[derive(Debug, Default)]
 pub(super) struct Stumps {
+    /// Which ends of segments are flat, as it follows from wounds and tree.
+    flat: FlatEnds,
     /// By node.
     severed: BTreeMap<u32, Severed>,
     /// The further pieces, by their slots behind those of the nodes.
@@ -60,6 +62,27 @@ impl Stumps {
         self.slots.len().next_power_of_two().max(FEWEST_SLOTS)
     }
 
+    /// Takes in which segments changed, and adds to them those that look otherwise because of that.
+    ///
+    /// Where no more than wounds changed, the cost is that of the segments that did; where the tree is other than before
+    /// (`of_tree`), that of all wounds.
+    pub(super) fn note(&mut self, wounds: Option<&Wounds>, vessels: &Vessels, of_tree: bool, changes: &mut Changes) {
+        let Some(wounds) = wounds else {
+            // All segments count as changed where a ledger is gone.
+            self.flat = FlatEnds::default();
+            return;
+        };
+        let (tree, flat) = (vessels.tree(), &mut self.flat);
+        let children = |node: NodeId| vessels.children(node.index()).map(|child| NodeId(child as u32));
+        let others = if of_tree || changes.is_all() {
+            flat.rebuild(wounds, tree, children)
+        } else {
+            let changed = changes.dirty_nodes(0..tree.len()).map(|node| NodeId(node as u32));
+            flat.update(wounds, tree, children, changed)
+        };
+        others.into_iter().for_each(|node| changes.add(node.index()));
+    }
+
     /// Takes in what became of the segments that changed, and forgets those of nodes from `len` on.
     ///
     /// The cost is that of what is severed, however much else has changed.
@@ -71,7 +94,8 @@ impl Stumps {
         changes: &Changes,
         len: usize,
     ) {
-        let is_healed = |node: NodeId| changes.contains(node.index()) && wounds.is_none_or(|all| !all.is_redrawn(node));
+        let is_redrawn = |node: NodeId| wounds.is_some_and(|wounds| self.flat.is_redrawn(wounds, node));
+        let is_healed = |node: NodeId| changes.contains(node.index()) && !is_redrawn(node);
         let known = self.severed.keys().map(|&node| NodeId(node));
         let gone: Vec<NodeId> = known.filter(|&node| node.index() >= len || is_healed(node)).collect();
         for node in gone {
@@ -79,9 +103,10 @@ impl Stumps {
         }
         let Some(wounds) = wounds else { return };
         let mut pieces = Vec::new();
-        for node in wounds.redrawn_within(0..len).filter(|node| changes.contains(node.index())) {
+        let redrawn = self.flat.redrawn_within(wounds, 0..len).filter(|node| changes.contains(node.index()));
+        for node in redrawn.collect::<Vec<_>>() {
             pieces.clear();
-            write_stumps_of(wounds, node, vessels.tree(), vessels.birth_steps(), colors, &mut pieces);
+            write_stumps_of(wounds, &self.flat, node, vessels.tree(), vessels.birth_steps(), colors, &mut pieces);
             self.insert(node, &pieces);
         }
     }
@@ -193,5 +218,21 @@ impl SegmentStore<'_, '_> {
             let spawned = self.fit_chunk((entity, segments), known, at, &contents, FEWEST_SLOTS);
             segments.stumps.chunks.extend(spawned);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::synthesis::instances::{END_DOME, LUMEN_DEPTH, START_DOME};
+
+    #[test]
+    fn the_shader_draws_ends_as_stumps_reckon_with_them() {
+        let shader = include_str!("segments.wgsl");
+        for (name, value) in [("START_DOME", START_DOME), ("LUMEN_DEPTH", LUMEN_DEPTH)] {
+            let line = format!("const {name}: f32 = {value:?};");
+            assert!(shader.contains(&line), "segments.wgsl has no `{line}`");
+        }
+        let dome = format!("let dome = select({END_DOME:?}, START_DOME, ");
+        assert!(shader.contains(&dome), "segments.wgsl has no `{dome}`");
     }
 }

@@ -1,9 +1,11 @@
 //! Random trees and the slowest index there is.
 
 use bevy_math::{Vec3, vec3};
+use bevy_vessels::synthesis::instances::{FlatEnds, SegmentColors, SegmentInstance, write_stumps};
 use bevy_vessels::synthesis::random::{Stream, VesselRng};
 use bevy_vessels::synthesis::segment_index::Region;
 use bevy_vessels::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
+use bevy_vessels::synthesis::wound::Wounds;
 use rand::RngExt;
 
 pub fn rng(seed: u64) -> VesselRng {
@@ -50,4 +52,17 @@ pub fn random_point(rng: &mut VesselRng) -> Vec3 {
 pub fn all(tree: &VesselTree) -> impl Fn(&Region, &mut dyn FnMut(NodeId)) + Copy {
     let nodes = tree.len() as u32;
     move |_, visit| (0..nodes).rev().for_each(|node| visit(NodeId(node)))
+}
+
+/// Which segments are drawn flat, from scratch.
+pub fn flat_ends(wounds: &Wounds, tree: &VesselTree) -> FlatEnds {
+    let children = tree.children();
+    FlatEnds::new(wounds, tree, |node| children.of(node.index()).iter().map(|&child| NodeId(child)))
+}
+
+/// All that is drawn in place of segments as they grew.
+pub fn stumps(wounds: &Wounds, tree: &VesselTree, colors: &SegmentColors) -> Vec<SegmentInstance> {
+    let mut out = Vec::new();
+    write_stumps(wounds, &flat_ends(wounds, tree), tree, &[], colors, &mut out);
+    out
 }

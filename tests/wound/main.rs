@@ -3,6 +3,7 @@
 mod common;
 mod crossings;
 mod degenerate;
+mod flat_ends;
 mod flow;
 mod indexed;
 mod ledger;

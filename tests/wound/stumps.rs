@@ -1,19 +1,13 @@
 //! What is left of cut vessels, to draw and to find.
 
-use crate::common::{all, forest, random_point, rng, straight};
+use crate::common::{all, flat_ends, forest, random_point, rng, straight, stumps};
 use bevy_math::{Vec3, vec3};
-use bevy_vessels::synthesis::instances::{SegmentColors, SegmentInstance, write_segments};
+use bevy_vessels::synthesis::instances::{SegmentColors, SegmentInstance, write_segments, write_stumps_of};
 use bevy_vessels::synthesis::tree::{NodeId, Place, VesselTree};
-use bevy_vessels::synthesis::wound::{Blade, Retraction, Wounds, write_stumps, write_stumps_of};
+use bevy_vessels::synthesis::wound::{Blade, PieceEnd, Retraction, Wounds};
 use rand::RngExt;
 
 const RED: SegmentColors = SegmentColors::Uniform([1.0, 0.0, 0.0]);
-
-fn stumps(wounds: &Wounds, tree: &VesselTree) -> Vec<SegmentInstance> {
-    let mut out = Vec::new();
-    write_stumps(wounds, tree, &[], &RED, &mut out);
-    out
-}
 
 fn cut_at(wounds: &mut Wounds, tree: &VesselTree, x: f32) {
     let blade = Blade::rectangle(Vec3::X * x, Vec3::Y, Vec3::Z).expect("a blade");
@@ -35,12 +29,14 @@ fn assert_gaps(sealed: bool, domes: [f32; 2]) {
             let everywhere = Blade::ball(Vec3::ZERO, 2.0).expect("a ball");
             wounds.cauterise(&everywhere, f32::INFINITY, &tree, all(&tree)).expect("a volume");
         }
-        let drawn = stumps(&wounds, &tree);
+        let drawn = stumps(&wounds, &tree, &RED);
         let pieces: Vec<_> = wounds.pieces(NodeId(1)).collect();
         assert_eq!((drawn.len(), pieces.len()), (3, 3));
         for (index, (instance, piece)) in drawn.iter().zip(&pieces).enumerate() {
             assert!(instance.is_visible(), "{instance:?}");
             let cut = [index > 0, index < 2];
+            let at_cut = if sealed { PieceEnd::Sealed } else { PieceEnd::Open };
+            assert_eq!(piece.ends, cut.map(|cut| if cut { at_cut } else { PieceEnd::Node }));
             assert_eq!(instance.is_open(), cut.map(|cut| cut && !sealed));
             let [start, end] = [0, 1].map(|side| if cut[side] { domes[side] * instance.radii()[side] } else { 0.0 });
             let (begins, ends) = (instance.start[0] - start, instance.end[0] + end);
@@ -68,14 +64,15 @@ fn pieces_share_colour_birth_and_taper_with_the_whole() {
     let positions = vec![Vec3::ZERO, Vec3::X, 3.0 * Vec3::X];
     let tree = VesselTree::from_arrays(positions, vec![u32::MAX, 0, 1], vec![0.06, 0.06, 0.05]).unwrap();
     let mut wounds = Wounds::new(Retraction { radii: 0.0, length: 0.4 }).unwrap();
-    assert!(stumps(&wounds, &tree).is_empty());
+    assert!(stumps(&wounds, &tree, &RED).is_empty());
     cut_at(&mut wounds, &tree, 2.0);
     let mut whole = [SegmentInstance::HIDDEN; 3];
     write_segments(&tree, &[0, 0, 7], 0..3, &RED, &mut whole);
     let mut out = Vec::new();
-    write_stumps_of(&wounds, NodeId(2), &tree, &[0, 0, 7], &RED, &mut out);
-    write_stumps_of(&wounds, NodeId(1), &tree, &[0, 0, 7], &RED, &mut out);
-    write_stumps_of(&wounds, NodeId(9), &tree, &[0, 0, 7], &RED, &mut out);
+    let flat = flat_ends(&wounds, &tree);
+    write_stumps_of(&wounds, &flat, NodeId(2), &tree, &[0, 0, 7], &RED, &mut out);
+    write_stumps_of(&wounds, &flat, NodeId(1), &tree, &[0, 0, 7], &RED, &mut out);
+    write_stumps_of(&wounds, &flat, NodeId(9), &tree, &[0, 0, 7], &RED, &mut out);
     assert_eq!(out.len(), 2, "nothing of a whole segment, or of none");
     for piece in &out {
         assert_eq!((piece.color, piece.birth), (whole[2].color, 7.0));
@@ -85,7 +82,7 @@ fn pieces_share_colour_birth_and_taper_with_the_whole() {
     // Three tenths of the way from 0.06 to 0.05.
     assert!((out[0].end_radius + 0.057).abs() < 1e-6, "open, so with a minus");
     wounds.undo_all(&tree);
-    assert!(stumps(&wounds, &tree).is_empty());
+    assert!(stumps(&wounds, &tree, &RED).is_empty());
 }
 
 #[test]
@@ -105,10 +102,10 @@ fn what_is_taken_out_or_only_clamped_is_not_drawn_in_pieces() {
     let tree = straight(3);
     let mut wounds = Wounds::default();
     wounds.clamp(Place::new(NodeId(1), 0.5), &tree).unwrap();
-    assert!(stumps(&wounds, &tree).is_empty() && !wounds.is_severed(NodeId(1)));
+    assert!(stumps(&wounds, &tree, &RED).is_empty() && !wounds.is_severed(NodeId(1)));
     wounds.cut(&Blade::ball(Vec3::X * 1.5, 0.8).unwrap(), &tree, all(&tree));
     assert!(wounds.is_severed(NodeId(2)));
-    assert_eq!(stumps(&wounds, &tree).len(), 2, "the middle segment is gone");
+    assert_eq!(stumps(&wounds, &tree, &RED).len(), 2, "the middle segment is gone");
 }
 
 /// The least distance from a point to the wall of what is left, by many points of every piece.

@@ -1,6 +1,6 @@
 //! How far ends draw back on a vessel of many segments: as far as on one of a few, until something holds them.
 
-use crate::common::{all, rng, tree};
+use crate::common::{all, flat_ends, rng, stumps, tree};
 use bevy_math::{Vec3, vec3};
 use bevy_vessels::synthesis::haemodynamics::{FlowSettings, Network};
 use bevy_vessels::synthesis::instances::{SegmentColors, SegmentInstance, write_segments};
@@ -8,7 +8,7 @@ use bevy_vessels::synthesis::random::VesselRng;
 use bevy_vessels::synthesis::tree::{NO_PARENT, NodeId, Place, VesselTree};
 use bevy_vessels::synthesis::{
     segment_index::SegmentIndex,
-    wound::{Blade, EndSide, Retraction, SeveredEnd, WoundError, Wounds, write_stumps},
+    wound::{Blade, EndSide, Retraction, SeveredEnd, WoundError, Wounds},
 };
 use rand::RngExt;
 
@@ -119,9 +119,11 @@ impl Line {
 /// All that is drawn: whole segments in their slots, and what is drawn in place of others.
 fn drawn(wounds: &Wounds, tree: &VesselTree) -> Vec<SegmentInstance> {
     let mut all = vec![SegmentInstance::HIDDEN; tree.len()];
-    write_segments(tree, &[], 0..tree.len(), &SegmentColors::Uniform([1.0; 3]), &mut all);
-    wounds.redrawn_within(0..tree.len()).for_each(|node| all[node.index()] = SegmentInstance::HIDDEN);
-    write_stumps(wounds, tree, &[], &SegmentColors::Uniform([1.0; 3]), &mut all);
+    let white = SegmentColors::Uniform([1.0; 3]);
+    write_segments(tree, &[], 0..tree.len(), &white, &mut all);
+    let flat = flat_ends(wounds, tree);
+    flat.redrawn_within(wounds, 0..tree.len()).for_each(|node| all[node.index()] = SegmentInstance::HIDDEN);
+    all.extend(stumps(wounds, tree, &white));
     all.retain(SegmentInstance::is_visible);
     all
 }
@@ -231,7 +233,8 @@ fn where_vessel_is_gone_with_an_end_there_is_none() {
     // The ends are cut again, where they are now.
     assert_eq!(wounds.cut(&across(&[4.4, 5.7]), &tree, all(&tree)).severed, 2);
     wounds.undo_all(&tree);
-    assert!(wounds.is_empty() && wounds.redrawn_within(0..tree.len()).count() == 0);
+    assert!(wounds.is_empty());
+    assert_eq!(flat_ends(&wounds, &tree).redrawn_within(&wounds, 0..tree.len()).count(), 0);
 }
 
 /// A trunk along x of short segments, with a branch at 5.
@@ -265,7 +268,7 @@ fn the_trunk_is_drawn_flat_beside_a_thin_branch_and_round_beside_a_wide_one() {
         let tree = branched(radius);
         let mut wounds = wounds(1.5);
         wounds.cut(&across(&[5.3]), &tree, all(&tree));
-        assert_eq!(wounds.is_redrawn(NodeId(25)), is_flat, "a branch of {radius}");
+        assert_eq!(flat_ends(&wounds, &tree).is_redrawn(&wounds, NodeId(25)), is_flat, "a branch of {radius}");
         assert!(!wounds.is_severed(NodeId(25)) && wounds.blockage(NodeId(25)).is_none());
         assert_eq!(wounds.blockages().count(), wounds.injured().count());
     }

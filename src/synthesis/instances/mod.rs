@@ -4,22 +4,31 @@
 //! for node `i`, that is, for the segment from its parent to it. A root has no segment, so its slot is
 //! [`SegmentInstance::HIDDEN`] and draws nothing. Because slots share the nodes' indices, a growth step rewrites exactly
 //! the ranges of nodes that it touched.
+//!
+//! Of cut vessels, [`write_stumps`] writes what is left, with [`FlatEnds`] beside the gaps.
 
-use crate::synthesis::tree::{NO_PARENT, VesselTree};
+use crate::synthesis::{
+    segment_index::start_radius,
+    tree::{NO_PARENT, VesselTree},
+};
 use bevy_math::{Vec3A, bounding::Aabb3d};
 use std::ops::Range;
 
 mod colors;
+mod flat_ends;
+mod stumps;
 
+pub use crate::synthesis::segment_index::MAX_FLARE;
 pub use colors::{SegmentColors, ramp_color};
+pub use flat_ends::FlatEnds;
+pub use stumps::{write_stumps, write_stumps_of};
 
-/// How much wider than itself a segment may begin.
-///
-/// A segment begins with its parent's radius, so that a vessel tapers without steps, but never with more than this
-/// multiple of its own: a thin side branch of a trunk would otherwise begin as a thorn as wide as the trunk. Both
-/// daughters of a symmetric bifurcation are thinner than their parent by 2^(1/κ), 1.26 at κ = 3 and 1.31 at κ = 2.55,
-/// so they still flare nearly all the way.
-pub const MAX_FLARE: f32 = 1.3;
+/// How far the round end of a segment reaches beyond its end, in radii. The shader has the same three numbers.
+pub(crate) const END_DOME: f32 = 1.0;
+/// The same beyond its start, where the dome is shallow.
+pub(crate) const START_DOME: f32 = 0.4;
+/// How deep one looks into the lumen of an open end, in radii.
+pub(crate) const LUMEN_DEPTH: f32 = 1.2;
 
 /// One vessel segment: a cone with round ends, in tissue lengths.
 ///
@@ -124,7 +133,7 @@ pub(crate) fn segment_instance(tree: &VesselTree, node: usize, birth: u32, color
     let radius = tree.radii()[node];
     SegmentInstance {
         start: tree.positions()[parent].to_array(),
-        start_radius: tree.radii()[parent].min(MAX_FLARE * radius),
+        start_radius: start_radius(tree, node),
         end: tree.positions()[node].to_array(),
         end_radius: radius,
         color: colors.color(radius, birth, node),

@@ -26,7 +26,7 @@ use bevy_math::Vec3;
 /// An index over the segments of one tree.
 ///
 /// A segment is known by its end node. Its box holds it with its radius, wherever the drawing may taper it from (see
-/// [`MAX_FLARE`](crate::synthesis::instances::MAX_FLARE)). Boxes are those of the last [`extend`](Self::extend) or
+/// [`MAX_FLARE`](super::MAX_FLARE)). Boxes are those of the last [`extend`](Self::extend) or
 /// refit; questions that take the tree measure it as it is.
 ///
 /// Memory: 44 bytes a segment, twice that while it is merged, counted by [`bytes`](Self::bytes).

@@ -13,4 +13,5 @@ pub use index::SegmentIndex;
 pub use ray_cast::RayCast;
 pub use region::Region;
 pub(crate) use region::axes;
+pub use round_cone::{MAX_FLARE, start_radius};
 pub use search::SegmentSearch;

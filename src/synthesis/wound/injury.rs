@@ -73,12 +73,10 @@ pub(super) struct Injury {
     gaps: Vec<Gap>,
     /// In the order of `from`.
     closures: Vec<Closure>,
-    /// Whether it is drawn flat in its parent, and in its own node, where a round end would reach into a gap.
-    flat: [bool; 2],
 }
 
 /// That of a segment to which nothing was done.
-pub(super) static NO_INJURY: Injury = Injury { gaps: Vec::new(), closures: Vec::new(), flat: [false; 2] };
+pub(super) static NO_INJURY: Injury = Injury { gaps: Vec::new(), closures: Vec::new() };
 
 /// A stretch that a volume takes out, as [`Severed`](super::Severed).
 #[derive(Clone, Copy, Debug)]
@@ -90,28 +88,9 @@ pub(super) struct Removal {
 }
 
 impl Injury {
+    /// Whether the vessel is neither severed nor held shut.
     pub fn is_empty(&self) -> bool {
-        !(self.is_redrawn() || self.is_injured())
-    }
-
-    /// Whether the vessel is severed or held shut.
-    pub fn is_injured(&self) -> bool {
-        !(self.gaps.is_empty() && self.closures.is_empty())
-    }
-
-    /// Whether it is drawn otherwise than it grew.
-    pub fn is_redrawn(&self) -> bool {
-        !self.gaps.is_empty() || self.flat != [false; 2]
-    }
-
-    /// Whether it is drawn flat in its parent, and in its own node.
-    pub fn flat(&self) -> [bool; 2] {
-        self.flat
-    }
-
-    /// Draws it flat on one side from now on: 0 in its parent, 1 in its own node. Returns whether that is new.
-    pub fn flatten(&mut self, side: usize) -> bool {
-        !std::mem::replace(&mut self.flat[side], true)
+        self.gaps.is_empty() && self.closures.is_empty()
     }
 
     pub fn gaps(&self) -> &[Gap] {

@@ -284,7 +284,7 @@ impl Wounds {
 
     /// The segments that anything was done to, in the order of their nodes.
     pub fn injured(&self) -> impl Iterator<Item = NodeId> + '_ {
-        self.injuries().filter(|(_, injury)| injury.is_injured()).map(|(node, _)| node)
+        self.injuries().map(|(node, _)| node)
     }
 
     pub(super) fn injury(&self, node: NodeId) -> Option<&Injury> {

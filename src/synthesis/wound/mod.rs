@@ -2,7 +2,8 @@
 //!
 //! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and a [`SegmentIndex`](super::segment_index::SegmentIndex). Out: a
 //! [`WoundReport`] for each action, with every end that it opened or closed; and at any time [`Wounds`], from which the
-//! flow learns how far blood comes ([`Wounds::interruptions`]) and a renderer what is left to draw ([`write_stumps`]).
+//! flow learns how far blood comes ([`Wounds::interruptions`]) and a renderer what is left of a vessel
+//! ([`Wounds::pieces`]). How that looks is said in [`instances`](super::instances).
 //!
 //! The tree itself is never changed: wounds are laid over it, each at a share of a segment. So growth, which only
 //! appends, and deformation, which moves nodes, go on beneath them, and undo is exact.
@@ -47,11 +48,11 @@ mod crossing;
 mod error;
 mod injury;
 mod ledger;
+mod pieces;
 mod report;
 mod retraction;
 #[cfg(feature = "serialize")]
 mod saved;
-mod stumps;
 mod withdrawal;
 
 pub use crate::synthesis::haemodynamics::EndSide;
@@ -59,6 +60,6 @@ pub use blade::{Blade, BladeError};
 pub use crossing::{Severed, severed};
 pub use error::WoundError;
 pub use ledger::Wounds;
+pub use pieces::{Blockage, PieceEnd, PieceKind, SegmentPiece};
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
 pub use retraction::Retraction;
-pub use stumps::{Blockage, PieceKind, SegmentPiece, write_stumps, write_stumps_of};

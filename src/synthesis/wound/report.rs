@@ -67,7 +67,9 @@ pub struct WoundReport {
     pub clamped: Vec<ClampId>,
     /// Clamps that were on before and no longer are: taken off, or cut away with their vessel.
     pub unclamped: Vec<ClampId>,
-    /// The nodes whose segments changed, each once: what to draw anew and to tell the flow.
+    /// The nodes whose segments were severed, taken out, closed or healed, each once: what to tell the flow and to draw
+    /// anew. Which whole segments beside them look otherwise, too, is told by
+    /// [`FlatEnds::update`](crate::synthesis::instances::FlatEnds::update).
     pub changed: Vec<NodeId>,
 }
 

@@ -4,22 +4,14 @@
 //! segment, planned before any of them is made, so that the order of the places makes no difference.
 //!
 //! An end draws back along the centre line, through nodes that only join two segments. Segments that it passes are taken
-//! out; the end lies on the one where it comes to rest. Wherever it lies, the round ends of whole segments nearby would
-//! reach past its tip and hide the gap, or fill the lumen, where segments are shorter than they are wide. Those are drawn
-//! flat from now on.
+//! out; the end lies on the one where it comes to rest.
 
 use super::crossing::{Severed, segment};
 use super::injury::{Gap, Injury, NO_INJURY, Removal, Tip};
-use super::stumps::{END_DOME, LUMEN_DEPTH, START_DOME};
 use crate::synthesis::haemodynamics::EndSide;
-use crate::synthesis::instances::MAX_FLARE;
 use crate::synthesis::tree::{NodeId, Place, VesselTree};
 use crate::synthesis::{segment_index::SegmentSearch, wound::Retraction};
 use std::collections::BTreeMap;
-
-/// How wide another branch may be, as a share of a vessel, that this vessel is drawn flat where both leave it. A wider one
-/// would be seen to end in the air.
-const THIN_BRANCH: f32 = 0.5;
 
 /// [`Retraction::MOST`], for lengths.
 const MOST: f64 = Retraction::MOST as f64;
@@ -31,8 +23,6 @@ pub(super) enum Change {
     Open(Gap),
     /// A gap in place of all that was in it.
     TakeOut(Removal, Gap),
-    /// No round end: in the parent for 0, in the node for 1.
-    Flatten(usize),
 }
 
 impl Change {
@@ -44,7 +34,6 @@ impl Change {
                 true
             }
             Self::TakeOut(removal, gap) => injury.take_out(removal, gap),
-            Self::Flatten(side) => injury.flatten(side),
         }
     }
 }
@@ -140,7 +129,6 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         let is_proximal = side == EndSide::Proximal;
         let sealed = if is_proximal { injury.is_sealed_below(share) } else { injury.is_sealed_above(share) };
         let tip = Some(Tip { end: new_end(rest.node), sealed });
-        self.flatten_around(rest, side);
         if rest.node == node {
             return (rest.along, tip);
         }
@@ -222,66 +210,6 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         let (mut child, mut several) = (None, false);
         self.children(joint, |other| several |= *child.get_or_insert(other) != other);
         if several { None } else { next.or(child) }
-    }
-
-    /// Draws whole segments flat whose round ends would reach past a tip, or into its lumen.
-    fn flatten_around(&mut self, tip: Place, side: EndSide) {
-        let lumen = f64::from(LUMEN_DEPTH * self.tree.radii()[tip.node.index()]);
-        let length = self.length(tip.node);
-        match side {
-            EndSide::Proximal => self.flatten_above(tip.node, f64::from(tip.along) * length, lumen),
-            EndSide::Distal => self.flatten_below(tip.node, f64::from(1.0 - tip.along) * length, lumen),
-        }
-    }
-
-    /// Those towards the root from a tip, which lies `distance` behind the beginning of its segment.
-    fn flatten_above(&mut self, mut child: NodeId, mut distance: f64, lumen: f64) {
-        let tree = self.tree;
-        while let Some(node) = tree.parent(child).filter(|&node| tree.parent(node).is_some()) {
-            let dome = f64::from(END_DOME * tree.radii()[node.index()]);
-            if distance >= dome + lumen || !self.is_continued(node, child) {
-                return;
-            }
-            self.changes.push((node.0, Change::Flatten(1)));
-            if !self.injury(node).gaps().is_empty() {
-                return;
-            }
-            distance += self.length(node);
-            child = node;
-        }
-    }
-
-    /// Whether a child goes on with the whole width of a segment, so that the end of that is not seen.
-    fn is_continued(&mut self, node: NodeId, child: NodeId) -> bool {
-        let radii = self.tree.radii();
-        let radius = radii[node.index()];
-        let mut is_alone = radius <= MAX_FLARE * radii[child.index()];
-        self.children(node, |other| is_alone &= other == child || radii[other.index()] <= THIN_BRANCH * radius);
-        is_alone
-    }
-
-    /// Those towards the tips, of which each begins within the round end of another: from the end of a segment, to
-    /// where it is `distance` from the tip.
-    fn flatten_below(&mut self, node: NodeId, distance: f64, lumen: f64) {
-        let radii = self.tree.radii();
-        let mut ends = vec![(node, distance)];
-        while let Some((node, distance)) = ends.pop() {
-            let mut near = Vec::new();
-            self.children(node, |child| {
-                let start_radius = radii[node.index()].min(MAX_FLARE * radii[child.index()]);
-                if distance < f64::from(START_DOME * start_radius) + lumen {
-                    near.push(child);
-                }
-            });
-            near.sort_unstable();
-            near.dedup();
-            for child in near {
-                self.changes.push((child.0, Change::Flatten(0)));
-                if self.injury(child).gaps().is_empty() {
-                    ends.push((child, distance + self.length(child)));
-                }
-            }
-        }
     }
 
     /// The segments that leave a node; some perhaps more than once.

@@ -4,8 +4,8 @@
 //! axis; the rings where the cone touches the spheres are shared, so normals are smooth all over. Tubes of neighbouring
 //! segments overlap at their common node, which hides the joint. One vessel is thus many closed pieces, not one surface.
 
-use crate::synthesis::instances::MAX_FLARE;
 use crate::synthesis::io::{WriteError, write_atomically};
+use crate::synthesis::segment_index::start_radius;
 use crate::synthesis::tree::{VesselKind, VesselTree};
 use bevy_math::{Vec3, ops};
 use std::f32::consts::{PI, TAU};
@@ -60,7 +60,7 @@ pub fn save_obj(
 
 /// Writes the segments of one or more trees as OBJ, one group (`g arterial`) per tree, in tissue lengths.
 ///
-/// A segment begins with its parent's radius, but with no more than [`MAX_FLARE`] times its own. Triangles are oriented
+/// A segment begins with its parent's radius, but with no more than [`MAX_FLARE`](crate::synthesis::segment_index::MAX_FLARE) times its own. Triangles are oriented
 /// outwards and every vertex has its normal. A segment within the sphere of one of its ends is
 /// drawn as that sphere.
 ///
@@ -83,7 +83,7 @@ pub fn write_obj(mut out: impl Write, trees: &[(VesselKind, &VesselTree)], optio
         writeln!(out, "g {}", system.name())?;
         for (node, parent) in tree.segments() {
             let radius = tree.radii()[node];
-            let start = (tree.positions()[parent], tree.radii()[parent].min(MAX_FLARE * radius));
+            let start = (tree.positions()[parent], start_radius(tree, node));
             template.write_vertices(&mut out, start, (tree.positions()[node], radius))?;
             template.write_triangles(&mut out, written)?;
             written += template.vertices();
