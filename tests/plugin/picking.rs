@@ -180,7 +180,10 @@ impl Twin {
     fn check(&self, found: &VesselPlace, world: &World, what: &str) {
         let (node, along) = (found.place.node.index(), f64::from(found.place.along));
         let left = &self.pieces[node];
-        assert!(left.iter().any(|&[from, to]| (from - 1e-6..=to + 1e-6).contains(&along)), "{what}: {found:?} of {left:?}");
+        assert!(
+            left.iter().any(|&[from, to]| (from - 1e-6..=to + 1e-6).contains(&along)),
+            "{what}: {found:?} of {left:?}"
+        );
         let position = self.to_world.transform_point3(self.tree.position_at(found.place).as_dvec3());
         assert!(position.distance(found.position.as_dvec3()) < 1e-4, "{what}: {found:?} is at {position}");
         let vessels = world.get::<Vessels>(found.vessels).expect("a vessel entity has vessels");
@@ -310,7 +313,8 @@ fn nearest_of(tree: &VesselTree, point: Vec3, reach: f32) -> Option<Place> {
         let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
         (a.lerp(b, share).distance(point) - tree.radii()[node], node, share)
     });
-    let nearest = places.filter(|&(distance, ..)| distance <= reach).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let nearest =
+        places.filter(|&(distance, ..)| distance <= reach).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     nearest.map(|(_, node, share)| Place::new(NodeId(node as u32), share))
 }
 

@@ -120,11 +120,7 @@ impl VesselPicker<'_, '_> {
     }
 
     /// The best of what is found in each vessel entity, each asked for what is no farther than the best before it.
-    fn best(
-        &self,
-        reach: f32,
-        find: impl Fn(&PickableItem, Affine3A, f32) -> Option<Near>,
-    ) -> Option<VesselPlace> {
+    fn best(&self, reach: f32, find: impl Fn(&PickableItem, Affine3A, f32) -> Option<Near>) -> Option<VesselPlace> {
         let mut best: Option<VesselPlace> = None;
         for found in &self.vessels {
             let Ok(global) = self.transforms.compute_global_transform(found.entity) else { continue };

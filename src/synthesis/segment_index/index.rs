@@ -17,10 +17,7 @@ use crate::synthesis::segment_index::{
     run::{Run, box_of, curve_through},
 };
 use crate::synthesis::{
-    space::{
-        morton::Curve,
-        packed_boxes::Pack,
-    },
+    space::{morton::Curve, packed_boxes::Pack},
     tree::{NodeId, Place, VesselTree},
 };
 use bevy_math::Vec3;

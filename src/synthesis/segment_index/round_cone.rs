@@ -95,11 +95,11 @@ impl RoundCone {
         let v = self.end - self.start;
         let radius = |share: f64| self.start_radius + share * (self.end_radius - self.start_radius);
         let at = |share: f64| self.start + share * v;
-        let piece =
-            Self { start: at(first), end: at(last), start_radius: radius(first), end_radius: radius(last) };
+        let piece = Self { start: at(first), end: at(last), start_radius: radius(first), end_radius: radius(last) };
         let [mut enter, mut leave] = piece.passage(from, direction)?;
         let (mut cut, rate) = (None, v.dot(direction));
-        for (share, ahead) in [(first, 1.0), (last, -1.0)].into_iter().filter(|(share, _)| *share > 0.0 && *share < 1.0) {
+        for (share, ahead) in [(first, 1.0), (last, -1.0)].into_iter().filter(|(share, _)| *share > 0.0 && *share < 1.0)
+        {
             let (depth, rate) = (ahead * v.dot(from - at(share)), ahead * rate);
             let crossed = -depth / rate;
             if rate > 0.0 && crossed > enter {
