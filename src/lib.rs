@@ -69,14 +69,14 @@ pub mod prelude {
     pub use crate::VesselPlugin;
     pub use crate::plugin::{
         Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, FollowsTetrahedra, GrowthAction, GrowthBudget,
-        GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, Perfusion,
-        SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystems, Vessels,
+        GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, OrganPaint,
+        Perfusion, SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystems, Vessels,
     };
     pub use crate::synthesis::colonization::ColonizationSettings;
     pub use crate::synthesis::generator::Generator;
     pub use crate::synthesis::preset::PresetName;
     pub use crate::synthesis::roots::{RootPlacement, RootPlacements};
-    pub use crate::synthesis::tissue::{TissueMode, TissueSource};
+    pub use crate::synthesis::tissue::TissueMode;
     pub use crate::synthesis::tree::VesselKind;
     pub use crate::synthesis::wound::Blade;
 }

@@ -47,11 +47,12 @@ impl OrganArgs {
         let settings = wish.generator.colonization_mut().expect("presets colonize");
         settings.arterial.terminal_radius *= radii;
         settings.venous.terminal_radius *= radii;
-        wish.tissue.mode = match self.mode {
+        let mode = match self.mode {
             Mode::Surface => TissueMode::Surface,
             Mode::Volume => TissueMode::Volume,
             Mode::Staged => TissueMode::Staged { surface_steps: settings.steps / 2 },
         };
+        wish.tissue = mode.into();
         if let Some(roots) = roots {
             wish.roots.artery = RootPlacement::Nearest(roots.arterial.clone());
             wish.roots.vein = RootPlacement::Nearest(roots.venous.clone());

@@ -12,7 +12,7 @@ use bevy_vessels::synthesis::{
     io::{MeshReadError, load_mesh},
     preset::{Preset, PresetName},
     roots::RootPlacement,
-    tissue::{Ball, Cuboid, Disc, Tissue, TissueMode},
+    tissue::{MeshTissue, SourceData, Tissue, TissueMode, TissueShape, TissueSource},
 };
 use clap::{Parser, ValueEnum};
 use std::io::Write;
@@ -232,22 +232,29 @@ fn read_preset(options: &Options) -> Result<(Preset, String), Failure> {
 }
 
 fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue>, Failure> {
-    let shape: Option<Arc<dyn Tissue>> = match options.tissue.to_str() {
-        Some("disc") => Some(Arc::new(Disc::flat(0.5).map_err(Failure::run)?)),
-        Some("ball") => Some(Arc::new(Ball::new(Vec3::ZERO, 0.5).map_err(Failure::run)?)),
-        Some("box") => Some(Arc::new(Cuboid::new(Vec3::ZERO, Vec3::ONE).map_err(Failure::run)?)),
+    let shape = match options.tissue.to_str() {
+        Some("disc") => Some(TissueShape::disc(0.5)),
+        Some("ball") => Some(TissueShape::ball(0.5)),
+        Some("box") => Some(TissueShape::cuboid(Vec3::ONE)),
         _ => None,
     };
+    let mut data = SourceData::default();
     match (shape, options.mode) {
         (Some(_), Some(_)) => {
-            Err(Failure::usage("--mode is for the mesh of an organ; disc, ball and box are as they are"))
+            return Err(Failure::usage("--mode is for the mesh of an organ; disc, ball and box are as they are"));
         }
-        (Some(shape), None) => Ok(shape),
+        (Some(shape), None) => preset.tissue = shape.into(),
         (None, mode) => {
+            // A file of settings may ask for a shape; the mesh on the command line goes before that.
+            let mut tissue = match &preset.tissue {
+                TissueSource::Mesh(mesh) => mesh.clone(),
+                _ => MeshTissue::default(),
+            };
             if let Some(mode) = mode {
                 let steps = colonization(preset, "--mode")?.steps;
-                preset.tissue.mode = mode.tissue_mode(preset.tissue.mode, steps);
+                tissue.mode = mode.tissue_mode(tissue.mode, steps);
             }
+            preset.tissue = tissue.into();
             let mesh = load_mesh(&options.tissue).map_err(|error| match error {
                 MeshReadError::UnknownFormat { path } => Failure::Usage(format!(
                     "--tissue is {}; it must be disc, ball, box, or a file that ends in .glb, .gltf or .obj",
@@ -255,8 +262,10 @@ fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue
                 )),
                 other => Failure::run(other),
             })?;
-            let built = preset.tissue.build(&mesh);
-            built.map_err(|error| Failure::Run(format!("{}: {error}", options.tissue.display())))
+            data.mesh = Some(Arc::new(mesh));
         }
     }
+    let prepared = preset.tissue.prepare(&data);
+    let named = |error| Failure::Run(format!("{}: {error}", options.tissue.display()));
+    Ok(Arc::clone(prepared.map_err(named)?.tissue()))
 }

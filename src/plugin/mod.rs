@@ -37,12 +37,12 @@ pub use circulation::{
 pub use deformation::{DeformationPlugin, FollowsMesh, FollowsTetrahedra};
 pub use growth::{
     EntityCommandsExt, GrowthAction, GrowthBudget, GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished,
-    GrowthFrame, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthStarted, GrowthState, OrganGrowthError, Vasculature,
-    diagnostics,
+    GrowthFrame, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthStarted, GrowthState, OrganGrowthError, OrganPaint,
+    Vasculature, diagnostics,
 };
 pub use job::{JobMode, JobSettings};
 pub use order::VesselSystems;
-pub use organ::{OrganMeshError, RestMesh, triangle_mesh};
+pub use organ::{OrganImage, OrganImageError, OrganMeshError, RestMesh, triangle_mesh};
 pub use scene::{PresetAsset, PresetLoadError, PresetLoader, ScenePlugin, VesselPreset};
 pub use surgery::{
     Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, Stroke, StrokeId,

@@ -93,9 +93,7 @@ fn painted_vertices_forbid_what_is_nearest_to_them() -> Outcome {
         let tissue = prepared(mode)?.painted(&painted(&mesh))?;
         for seed in 0..2 {
             // On the way to the middle the same part of the surface is nearest. An edge is 0.1 long.
-            let below = |point: Vec3, radius: f32| {
-                point.length() > 0.2 && point.normalize().distance(Vec3::X) < radius
-            };
+            let below = |point: Vec3, radius: f32| point.length() > 0.2 && point.normalize().distance(Vec3::X) < radius;
             let growth = grow(&tissue, &Roots::default(), seed, |point| below(point, 0.38));
             let near = growth.tree(VesselKind::Artery).positions().iter().filter(|&&node| below(node, 0.68)).count();
             assert!(near > 5, "{mode:?}, seed {seed}: {near} nodes near what is painted");
@@ -108,10 +106,8 @@ fn painted_vertices_forbid_what_is_nearest_to_them() -> Outcome {
 #[test]
 fn vessels_go_round_and_supply_the_other_side() -> Outcome {
     let rectangle = TissueShape::Rectangle { center: Vec3::ZERO, half_x: Vec3::X * 0.5, half_y: Vec3::Y * 0.5 };
-    let roots = Roots::from(RootPlacements {
-        artery: RootPlacement::Exact(vec![Vec3::X * -0.4]),
-        ..RootPlacements::default()
-    });
+    let roots =
+        Roots::from(RootPlacements { artery: RootPlacement::Exact(vec![Vec3::X * -0.4]), ..RootPlacements::default() });
     for (shape, radius, steps) in [(rectangle, 0.25, 90), (TissueShape::cuboid(Vec3::new(1.0, 1.0, 0.4)), 0.15, 110)] {
         let region = NoGoRegion::Ball { center: Vec3::ZERO, radius };
         let in_its_shadow = |node: &&Vec3| node.x > radius && node.y.abs() < radius;
@@ -124,7 +120,10 @@ fn vessels_go_round_and_supply_the_other_side() -> Outcome {
             for kind in KINDS {
                 let [open, round] = [&open, &round].map(|growth| growth.tree(kind));
                 let [there, least] = [round, open].map(|tree| tree.positions().iter().filter(in_its_shadow).count());
-                assert!(least > 50 && there * 3 > least, "{shape:?}, seed {seed}: {there} {kind:?}s where there would be {least}");
+                assert!(
+                    least > 50 && there * 3 > least,
+                    "{shape:?}, seed {seed}: {there} {kind:?}s where there would be {least}"
+                );
                 assert_no_segment_crosses(round, region);
             }
         }
@@ -188,8 +187,11 @@ fn forbidden_as_a_whole_there_is_no_root_and_given_vessels_rest() -> Outcome {
         let tissue = prepared(mode)?.painted(&regions([everything]))?;
         let error = Colonization::new(tissue.clone(), settings(), &Roots::default(), 1).err();
         assert!(matches!(error, Some(ColonizationError::Roots(RootError::NoRoom { found: 0, .. }))), "{error:?}");
-        let mut roots =
-            Roots::from(RootPlacements { artery: RootPlacement::None, vein: RootPlacement::None, ..Default::default() });
+        let mut roots = Roots::from(RootPlacements {
+            artery: RootPlacement::None,
+            vein: RootPlacement::None,
+            ..Default::default()
+        });
         roots.given.artery = Some(given.clone());
         let growth = grow(&tissue, &roots, 1, |point| point != Vec3::X * 0.99);
         assert_eq!((growth.tree(VesselKind::Artery).len(), growth.drains_left(VesselKind::Artery)), (1, 0));

@@ -151,7 +151,10 @@ fn impossible_sources_and_paint_are_refused() -> Outcome {
         let no_go = NoGo { regions: vec![region], ..NoGo::default() };
         painted(staged, &ball, &TissuePaint { no_go, ..TissuePaint::default() }).err()
     };
-    assert!(matches!(region(NoGoRegion::Ball { center: Vec3::ZERO, radius: 0.0 }), Some(TissueError::NotPositive { .. })));
+    assert!(matches!(
+        region(NoGoRegion::Ball { center: Vec3::ZERO, radius: 0.0 }),
+        Some(TissueError::NotPositive { .. })
+    ));
     assert!(matches!(region(NoGoRegion::Ball { center: Vec3::NAN, radius: 1.0 }), Some(TissueError::NotFinite { .. })));
     let flat = NoGoRegion::Cuboid { center: Vec3::ZERO, size: Vec3::new(1.0, 1.0, -1.0) };
     assert!(matches!(region(flat), Some(TissueError::NotPositive { .. })));
@@ -174,10 +177,7 @@ fn impossible_sources_and_paint_are_refused() -> Outcome {
 fn sources_and_paint_are_written_and_read_as_ron() -> Outcome {
     let paint = TissuePaint {
         density: Some(vec![0.5]),
-        no_go: NoGo {
-            vertices: Some(vec![true]),
-            regions: vec![NoGoRegion::Ball { center: Vec3::X, radius: 0.1 }],
-        },
+        no_go: NoGo { vertices: Some(vec![true]), regions: vec![NoGoRegion::Ball { center: Vec3::X, radius: 0.1 }] },
         guides: vec![Guide { points: vec![Vec3::X, Vec3::Y], deviation: 0.1, steps: 7 }],
     };
     assert_eq!(ron::from_str::<TissuePaint>(&ron::to_string(&paint)?)?, paint);

@@ -1,10 +1,11 @@
 //! Growing an organ in one call, without waiting for frames.
 
 use crate::plugin::growth::{
+    followed::Need,
     grow::{end_growths, run_to_end},
     publish::publish_vessels,
-    source::{Organ, OrganMeshes, StartMessages},
-    state::Need,
+    source::{Organ, StartMessages},
+    tissue::OrganAssets,
 };
 use bevy::{
     ecs::{
@@ -55,7 +56,7 @@ fn grow_organ_now(world: &mut World, organ: Entity) -> Result<(), RegisteredSyst
 }
 
 /// Prepares an organ here and now, and does all its steps.
-fn finish_organ(In(entity): In<Entity>, meshes: OrganMeshes, mut organs: Query<Organ>, mut messages: StartMessages) {
+fn finish_organ(In(entity): In<Entity>, assets: OrganAssets, mut organs: Query<Organ>, mut messages: StartMessages) {
     let Ok(mut organ) = organs.get_mut(entity) else {
         warn!("{entity}: grow_now is for entities with a Vasculature");
         return;
@@ -63,7 +64,7 @@ fn finish_organ(In(entity): In<Entity>, meshes: OrganMeshes, mut organs: Query<O
     organ.follow();
     organ.state.hasten();
     if organ.state.need != Need::Nothing {
-        let outcome = organ.begin(&meshes, None);
+        let outcome = organ.begin(&assets, None);
         organ.report(outcome, &mut messages);
     }
     run_to_end(&mut organ.state, &mut organ.progress);

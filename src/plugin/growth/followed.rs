@@ -29,10 +29,7 @@ pub(crate) struct SourceAssets {
 impl SourceAssets {
     /// Those that a source needs.
     fn needed_by(self, source: &TissueSource) -> Self {
-        Self {
-            mesh: self.mesh.filter(|_| source.needs_mesh()),
-            image: self.image.filter(|_| source.image().is_some()),
-        }
+        Self { mesh: self.mesh.filter(|_| source.needs_mesh()), image: self.image.filter(|_| source.image().is_some()) }
     }
 }
 
@@ -101,6 +98,9 @@ mod tests {
         let (shape, blank) = (Vasculature::default().with_tissue(TissueShape::ball(1.0)), TissuePaint::default());
         let followed = following(&shape);
         assert_eq!(followed.need(&shape, &blank, SourceAssets::default()), Need::Nothing);
-        assert!(!followed.is_of_mesh(AssetId::invalid()) && following(&Vasculature::default()).is_of_mesh(AssetId::invalid()));
+        assert!(
+            !followed.is_of_mesh(AssetId::invalid())
+                && following(&Vasculature::default()).is_of_mesh(AssetId::invalid())
+        );
     }
 }

@@ -65,7 +65,7 @@ pub(crate) fn end_growths(
     mut finished: Announcer<GrowthFinished>,
 ) {
     for (organ, state, mut progress) in &mut organs {
-        if progress.phase == GrowthPhase::Growing && is_done(state) {
+        if progress.phase == GrowthPhase::Growing && state.is_done() {
             progress.phase = GrowthPhase::Finished;
             finished.announce(GrowthFinished { organ });
         }
@@ -79,16 +79,20 @@ fn step(state: &mut GrowthState, progress: &mut GrowthProgress) {
     let cost = start.elapsed();
     state.note_step(cost);
     let grow_time = progress.grow_time + cost;
-    *progress = GrowthProgress::of(GrowthPhase::Growing, state.growth(), grow_time);
+    let phase = if state.successor().is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing };
+    *progress = GrowthProgress::of(phase, state.active(), grow_time);
 }
 
-/// Brings an organ's radii up to date with its steps.
+/// Brings an organ's radii up to date with its steps. A successor that has come as far takes the place of what is drawn.
 fn settle(state: &mut GrowthState, progress: &mut GrowthProgress) {
     let start = Instant::now();
     state.settle();
     let cost = start.elapsed();
     state.note_settling(cost);
     progress.grow_time += cost;
+    if progress.phase == GrowthPhase::Regrowing && state.successor().is_none() {
+        progress.phase = GrowthPhase::Growing;
+    }
 }
 
 /// Does the steps again that an organ had done when it was saved, and says how many they were.
@@ -102,9 +106,9 @@ fn catch_up(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
 
 /// Does all remaining steps of an organ that has its tissue, and says how many they were.
 pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
-    if state.growth().is_none() || is_done(state) {
+    if !state.is_growing() {
         // Without a tissue the wish stays; at the end there is nothing left to wish for.
-        state.finish &= !is_done(state);
+        state.finish &= !state.is_done();
         return 0;
     }
     let start = Instant::now();
@@ -113,9 +117,4 @@ pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress)
     let grow_time = progress.grow_time + start.elapsed();
     *progress = GrowthProgress::of(GrowthPhase::Growing, state.growth(), grow_time);
     progress.step - before
-}
-
-/// Whether there is a growth, and it has done all its steps.
-pub(crate) fn is_done(state: &GrowthState) -> bool {
-    state.growth().is_some_and(|growth| growth.is_finished())
 }

@@ -1,6 +1,6 @@
 //! What is said to a growth, and what it answers.
 
-use crate::plugin::organ::mesh::OrganMeshError;
+use crate::plugin::organ::{image::OrganImageError, mesh::OrganMeshError};
 use crate::synthesis::{generator::GeneratorError, tissue::TissueError};
 use bevy::{
     ecs::{
@@ -55,7 +55,8 @@ pub enum GrowthAction {
     Finish,
 }
 
-/// An organ's growth starts from its roots, for the first time or again. Also an event on the organ, for observers.
+/// An organ's growth starts from its roots, for the first time or again, unseen where
+/// [paint](crate::plugin::OrganPaint) has changed. Also an event on the organ, for observers.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Message, Event, Clone, PartialEq)]
 pub struct GrowthStarted {
@@ -105,7 +106,10 @@ pub enum OrganGrowthError {
     /// Its mesh is not one that vessels can grow on.
     #[error(transparent)]
     Mesh(#[from] OrganMeshError),
-    /// Its mesh gives no tissue of the kind that is asked for.
+    /// Its image is not one that a tissue can be read from.
+    #[error(transparent)]
+    Image(#[from] OrganImageError),
+    /// It gives no tissue of the kind that is asked for, or not with what is painted on it.
     #[error(transparent)]
     Tissue(#[from] TissueError),
     /// Its preset could not be loaded.

@@ -6,11 +6,12 @@ use crate::plugin::{
 };
 use bevy::{
     app::{App, Plugin, Update},
-    asset::Assets,
+    asset::{AssetEvent, Assets},
     ecs::{
         intern::Interned,
         schedule::{IntoScheduleConfigs, ScheduleLabel},
     },
+    image::Image,
     log::warn,
     mesh::Mesh,
 };
@@ -18,17 +19,23 @@ use bevy::{
 pub(crate) mod budget;
 pub(crate) mod commands;
 pub mod diagnostics;
+pub(crate) mod followed;
 pub(crate) mod grow;
 pub(crate) mod messages;
+pub(crate) mod paint;
 pub(crate) mod progress;
 pub(crate) mod publish;
 pub(crate) mod source;
 pub(crate) mod state;
+pub(crate) mod steps;
+pub(crate) mod successor;
+pub(crate) mod tissue;
 pub(crate) mod vasculature;
 
 pub use budget::{GrowthBudget, GrowthFrame};
 pub use commands::EntityCommandsExt;
 pub use messages::{GrowthAction, GrowthCommand, GrowthFailed, GrowthFinished, GrowthStarted, OrganGrowthError};
+pub use paint::OrganPaint;
 pub use progress::{GrowthControl, GrowthPhase, GrowthProgress};
 pub use state::GrowthState;
 pub use vasculature::Vasculature;
@@ -75,6 +82,7 @@ impl Plugin for GrowthPlugin {
             .add_message::<GrowthStarted>()
             .add_message::<GrowthFinished>()
             .add_message::<GrowthFailed>()
+            .add_message::<AssetEvent<Image>>()
             .add_observer(publish::remove_vessels);
         diagnostics::register(app);
         let source = (

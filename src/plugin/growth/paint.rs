@@ -25,7 +25,9 @@ use bevy::{
 /// let mut paint = OrganPaint::default();
 /// paint.no_go.regions.push(NoGoRegion::Ball { center: Vec3::Y, radius: 0.2 });
 /// ```
-#[derive(Component, Clone, Debug, Default, PartialEq, Deref, DerefMut, Reflect, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Component, Clone, Debug, Default, PartialEq, Deref, DerefMut, Reflect, serde::Serialize, serde::Deserialize,
+)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct OrganPaint(pub TissuePaint);
 

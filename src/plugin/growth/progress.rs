@@ -14,14 +14,19 @@ pub enum GrowthPhase {
     /// The organ has no mesh yet, or its mesh is still being loaded.
     #[default]
     WaitingForMesh,
-    /// The mesh is made into a tissue: for large organs beside the frames, as [`JobSettings`](crate::plugin::JobSettings) say.
+    /// The image that the tissue is read from is still being loaded.
+    WaitingForImage,
+    /// The mesh, or whatever the tissue is made of, is made into a tissue: for large organs beside the frames, as [`JobSettings`](crate::plugin::JobSettings) say.
     PreparingTissue,
     /// Steps are done, as the [budget](crate::plugin::GrowthBudget) allows. A paused growth is in this phase, too.
     Growing,
+    /// The organ's [paint](crate::plugin::OrganPaint) has changed: other vessels grow unseen on what is painted now. Those
+    /// that are drawn stay until these have done as many steps. What is told of steps and nodes is told of these.
+    Regrowing,
     /// All steps are done.
     Finished,
-    /// Something is wrong with the mesh or the settings: [`GrowthState::error`](crate::plugin::GrowthState::error) says what. Changing the culprit starts
-    /// the growth again.
+    /// Something is wrong with the mesh, the image, the settings or the paint:
+    /// [`GrowthState::error`](crate::plugin::GrowthState::error) says what. Changing the culprit starts the growth again.
     Failed,
 }
 
@@ -80,7 +85,8 @@ pub enum GrowthControl {
     /// Steps follow one another as the budget allows.
     #[default]
     Running,
-    /// No step is done but those that are asked for. The tissue is prepared all the same.
+    /// No step is done but those that are asked for, of vessels that grow unseen neither. The tissue is prepared all the
+    /// same.
     Paused,
 }
 

@@ -1,31 +1,30 @@
-//! Source: from an organ's mesh and wishes to a growth that can step.
+//! Source: from an organ's mesh, or whatever its tissue is made of, and wishes to a growth that can step.
 //!
-//! Each frame: commands are obeyed, then wishes and meshes are compared with what the growth follows, then what the
-//! difference needs is done. A new tissue is prepared in a job, a growth on the same tissue starts at once and uses its
-//! buffers again. Where many growths start at once, the budget spreads them over frames.
+//! Each frame: commands are obeyed, then wishes, paint and assets are compared with what the growth follows, then what the
+//! difference needs is done. A new tissue is prepared in a job, other paint is laid over it in another, a growth on the same
+//! tissue starts at once and uses its buffers again. Where many growths start at once, the budget spreads them over frames.
 
 use crate::plugin::{
     announcer::Announcer,
     growth::{
         budget::{GrowthBudget, GrowthFrame, LastCosts, begin_after},
+        followed::{Need, SourceAssets},
         messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganGrowthError},
+        paint::OrganPaint,
         progress::{GrowthControl, GrowthPhase, GrowthProgress},
-        state::{GrowthState, Need, Prepared},
+        state::GrowthState,
+        tissue::{Copied, OrganAssets, Painted, PaintedTissue},
         vasculature::Vasculature,
     },
     job::Jobs,
-    organ::{
-        mesh::{MeshCopy, OrganMeshError, copy_mesh},
-        rest::RestMesh,
-    },
+    organ::{image::OrganImage, rest::RestMesh},
 };
 use crate::synthesis::{
-    mesh::TriangleMesh,
     pace::{Pace, at_once},
-    tissue::{SourceData, Tissue, TissueSource},
+    tissue::TissuePaint,
 };
 use bevy::{
-    asset::{AssetEvent, AssetId, AssetServer, Assets, LoadState},
+    asset::{Asset, AssetEvent, AssetId, Assets},
     ecs::{
         change_detection::{DetectChanges, DetectChangesMut, Ref, Res, ResMut},
         entity::Entity,
@@ -33,11 +32,12 @@ use bevy::{
         query::QueryData,
         system::{Local, Query, SystemParam},
     },
+    image::Image,
     log::warn,
     mesh::{Mesh, Mesh3d},
     platform::time::Instant,
 };
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 /// An organ, with all that its source touches.
 #[derive(QueryData)]
@@ -45,17 +45,12 @@ use std::{sync::Arc, time::Duration};
 pub(crate) struct Organ {
     pub(crate) entity: Entity,
     pub(crate) wish: Ref<'static, Vasculature>,
+    paint: Option<Ref<'static, OrganPaint>>,
     pub(crate) mesh: Option<&'static Mesh3d>,
+    image: Option<&'static OrganImage>,
     pub(crate) state: &'static mut GrowthState,
     pub(crate) progress: &'static mut GrowthProgress,
     rest: Option<&'static RestMesh>,
-}
-
-/// Where meshes come from.
-#[derive(SystemParam)]
-pub(crate) struct OrganMeshes<'w> {
-    meshes: Res<'w, Assets<Mesh>>,
-    server: Option<Res<'w, AssetServer>>,
 }
 
 /// Where a growth reports how it starts.
@@ -78,18 +73,23 @@ pub(crate) fn obey_commands(
     }
 }
 
-/// Compares wishes and meshes with what each growth follows.
+/// Compares wishes, paint and assets with what each growth follows.
 ///
 /// A mesh that vessels follow may have other positions than before: that is no change.
 pub(crate) fn notice_changes(
-    mut events: MessageReader<AssetEvent<Mesh>>,
+    mut mesh_events: MessageReader<AssetEvent<Mesh>>,
+    mut image_events: MessageReader<AssetEvent<Image>>,
     meshes: Res<Assets<Mesh>>,
     mut organs: Query<Organ>,
 ) {
-    let news: Vec<_> = events.read().filter_map(mesh_news).collect();
+    let mesh_news: Vec<_> = mesh_events.read().filter_map(news).collect();
+    let image_news: Vec<_> = image_events.read().filter_map(news).collect();
     for mut organ in &mut organs {
         organ.follow();
-        for &(mesh, replaced) in &news {
+        for &(image, replaced) in &image_news {
+            organ.state.notice_image(image, replaced);
+        }
+        for &(mesh, replaced) in &mesh_news {
             let is_deformed = || organ.rest.is_some_and(|rest| rest.is_of(meshes.get(mesh)));
             if organ.mesh.is_some_and(|organ_mesh| organ_mesh.id() == mesh) && !is_deformed() {
                 organ.state.notice_mesh(mesh, replaced);
@@ -98,9 +98,9 @@ pub(crate) fn notice_changes(
     }
 }
 
-/// Begins what is needed: a tissue's preparation, or a growth on the tissue at hand.
+/// Begins what is needed: to prepare a tissue, to paint it, or a growth on the tissue at hand.
 pub(crate) fn begin(
-    meshes: OrganMeshes,
+    assets: OrganAssets,
     mut organs: Query<Organ>,
     mut messages: StartMessages,
     mut account: StartAccount,
@@ -109,7 +109,7 @@ pub(crate) fn begin(
     let waiting = organs.iter().filter(|organ| organ.state.need != Need::Nothing).map(|organ| organ.entity);
     account.start_in_turn(waiting.collect(), |organ| {
         let Ok(mut organ) = organs.get_mut(organ) else { return };
-        let outcome = organ.begin(&meshes, Some(&jobs));
+        let outcome = organ.begin(&assets, Some(&jobs));
         organ.report(outcome, &mut messages);
     });
 }
@@ -120,7 +120,7 @@ pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessa
     account.start_in_turn(ready.collect(), |organ| {
         let Ok(mut organ) = organs.get_mut(organ) else { return };
         if let Some(prepared) = organ.state.poll_preparation() {
-            let outcome = organ.start(Some(prepared));
+            let outcome = prepared.and_then(|tissue| organ.start(tissue));
             organ.report(outcome, &mut messages);
         }
     });
@@ -165,33 +165,12 @@ impl StartAccount<'_, '_> {
     }
 }
 
-/// A mesh asset with new content (`true`), or one that has just come (`false`).
-fn mesh_news(event: &AssetEvent<Mesh>) -> Option<(AssetId<Mesh>, bool)> {
+/// An asset with new content (`true`), or one that has just come (`false`).
+fn news<A: Asset>(event: &AssetEvent<A>) -> Option<(AssetId<A>, bool)> {
     match *event {
         AssetEvent::Modified { id } => Some((id, true)),
         AssetEvent::Added { id } => Some((id, false)),
         _ => None,
-    }
-}
-
-/// The slow part of the preparation, as a pure function of what was copied from the mesh.
-async fn prepare(copy: MeshCopy, source: TissueSource, pace: Pace) -> Prepared {
-    let mesh = TriangleMesh::new(copy.positions, copy.triangles, None).map_err(OrganMeshError::from)?;
-    let data = SourceData { mesh: Some(Arc::new(mesh)), image: None };
-    Ok(Arc::clone(source.prepare_paced(&data, &pace).await?.tissue()))
-}
-
-impl OrganMeshes<'_> {
-    /// A copy of an organ's mesh, `None` while it is on its way.
-    fn copy(&self, mesh: Option<&Mesh3d>) -> Result<Option<MeshCopy>, OrganMeshError> {
-        let Some(mesh) = mesh else { return Ok(None) };
-        if let Some(mesh) = self.meshes.get(mesh.id()) {
-            return copy_mesh(mesh).map(Some);
-        }
-        match self.server.as_ref().map(|server| server.load_state(mesh.id())) {
-            Some(LoadState::Failed(error)) => Err(OrganMeshError::NotLoaded { reason: error.to_string() }),
-            _ => Ok(None),
-        }
     }
 }
 
@@ -201,43 +180,80 @@ type Started = bool;
 impl OrganItem<'_, '_> {
     /// Takes note of changed wishes.
     pub(crate) fn follow(&mut self) {
-        let mesh = self.mesh.map(|mesh| mesh.id());
+        let assets = SourceAssets { mesh: self.mesh.map(|mesh| mesh.id()), image: self.image.map(|image| image.id()) };
         self.state.bypass_change_detection().resume(self.progress.step);
-        if self.wish.is_changed() || self.state.follows_other_mesh(mesh) {
-            self.state.follow(&self.wish, mesh);
+        let is_painted = match &self.paint {
+            Some(paint) => paint.is_changed(),
+            None => !self.state.paint().is_blank(),
+        };
+        if self.wish.is_changed() || is_painted || self.state.follows_other_assets(assets) {
+            let blank = TissuePaint::default();
+            let paint = self.paint.as_ref().map_or(&blank, |paint| &paint.0);
+            self.state.follow(&self.wish, paint, assets);
         }
     }
 
-    /// Does what is needed next. A tissue is prepared in a job; without jobs, here and now.
-    pub(crate) fn begin(&mut self, meshes: &OrganMeshes, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
+    /// Does what is needed next. A tissue is prepared and painted in jobs; without jobs, here and now.
+    pub(crate) fn begin(&mut self, assets: &OrganAssets, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         match self.state.next_need() {
             Need::Nothing => Ok(false),
-            Need::Growth => self.start(None),
-            Need::Tissue => {
-                self.state.drop_tissue();
-                let Some(copy) = meshes.copy(self.mesh)? else {
-                    self.enter(GrowthPhase::WaitingForMesh);
-                    return Ok(false);
-                };
-                self.enter(GrowthPhase::PreparingTissue);
-                let settings = self.wish.tissue.clone();
-                let Some(jobs) = jobs else {
-                    return self.start(Some(at_once(prepare(copy, settings, Pace::default()))));
-                };
-                let work = settings.work(copy.triangles.len());
-                self.state.await_tissue(jobs.start(work, |pace| prepare(copy, settings, pace)));
-                Ok(false)
-            }
+            Need::Tissue => self.prepare(assets, jobs),
+            need => self.grow_on_tissue_at_hand(need, jobs),
         }
     }
 
-    /// Starts the growth, on a tissue that has just been prepared or on the one at hand.
-    pub(crate) fn start(&mut self, prepared: Option<Prepared>) -> Result<Started, OrganGrowthError> {
-        let tissue: Option<Arc<dyn Tissue>> = prepared.transpose()?;
+    /// Prepares the tissue, and paints it.
+    fn prepare(&mut self, assets: &OrganAssets, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
+        self.state.drop_tissue();
+        let copy = match assets.copy(&self.wish.tissue, self.mesh, self.image)? {
+            Copied::Source(copy) => copy,
+            Copied::NoMeshYet => return self.wait(GrowthPhase::WaitingForMesh),
+            Copied::NoImageYet => return self.wait(GrowthPhase::WaitingForImage),
+        };
+        self.enter(GrowthPhase::PreparingTissue);
+        let (source, paint) = (self.wish.tissue.clone(), self.state.paint());
+        self.run(copy.work(&source), jobs, |pace| copy.prepare(source, paint, pace))
+    }
+
+    /// Grows on the tissue at hand, which is painted first where it isn't yet as it is to be. After a stroke, vessels grow
+    /// beside those that are drawn.
+    fn grow_on_tissue_at_hand(&mut self, need: Need, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
+        self.state.choose_place(need);
+        if self.state.takes_back() {
+            return self.wait(self.state.phase());
+        }
+        let (paint, tissue) = (self.state.paint(), self.state.tissue_at_hand().cloned());
+        let Some(tissue) = tissue else { return Ok(false) };
+        if *tissue.paint == *paint {
+            return self.start(tissue);
+        }
+        let phase = if self.state.is_beside() { GrowthPhase::Regrowing } else { GrowthPhase::PreparingTissue };
+        self.enter(phase);
+        self.run(tissue.work(&paint), jobs, |_| tissue.repainted(paint))
+    }
+
+    /// Has a tissue made in a job, and is not waited for; without jobs, starts the growth on it.
+    fn run<W>(
+        &mut self,
+        items: usize,
+        jobs: Option<&Jobs>,
+        work: impl FnOnce(Pace) -> W,
+    ) -> Result<Started, OrganGrowthError>
+    where
+        W: Future<Output = Painted> + Send + 'static,
+    {
+        let Some(jobs) = jobs else { return self.start(at_once(work(Pace::default()))?) };
+        self.state.await_tissue(jobs.start(items, work));
+        Ok(false)
+    }
+
+    /// Starts the growth on a tissue.
+    pub(crate) fn start(&mut self, tissue: PaintedTissue) -> Result<Started, OrganGrowthError> {
         for warning in self.state.start(tissue, &self.wish)? {
             warn!("{}: {warning}", self.entity);
         }
-        self.enter(GrowthPhase::Growing);
+        let phase = if self.state.successor().is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing };
+        self.enter(phase);
         Ok(true)
     }
 
@@ -248,16 +264,25 @@ impl OrganItem<'_, '_> {
             Ok(true) => messages.started.announce(GrowthStarted { organ }),
             Ok(false) => {}
             Err(error) => {
-                warn!("{organ}: no vessels grow here: {error}");
                 self.state.fail(error.clone());
+                let stay =
+                    if self.state.growth().is_some() { "its vessels stay as they are" } else { "no vessels grow here" };
+                warn!("{organ}: {stay}: {error}");
                 self.enter(GrowthPhase::Failed);
                 messages.failed.announce(GrowthFailed { organ, error });
             }
         }
     }
 
+    /// Enters a phase in which nothing starts.
+    fn wait(&mut self, phase: GrowthPhase) -> Result<Started, OrganGrowthError> {
+        self.enter(phase);
+        Ok(false)
+    }
+
     fn enter(&mut self, phase: GrowthPhase) {
-        let progress = GrowthProgress::of(phase, self.state.growth(), Duration::ZERO);
+        let growth = if phase == GrowthPhase::Regrowing { self.state.successor() } else { self.state.growth() };
+        let progress = GrowthProgress::of(phase, growth, Duration::ZERO);
         self.progress.set_if_neq(progress);
     }
 }

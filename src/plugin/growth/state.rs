@@ -1,82 +1,64 @@
 //! What the plugin keeps about an organ while it grows: the tissue, the growth, and what is still to be done.
+//!
+//! What a growth follows is in [`followed`](super::followed), its steps and what they changed in [`steps`](super::steps).
 
 use crate::plugin::{
     growth::{
-        budget::{LastCosts, StepCost},
+        followed::{Followed, Need, SourceAssets},
         messages::{GrowthAction, OrganGrowthError},
-        progress::GrowthControl,
+        progress::{GrowthControl, GrowthPhase},
+        steps::Costs,
+        successor::Successor,
+        tissue::{Painted, PaintedTissue},
         vasculature::Vasculature,
     },
     job::Job,
-    organ::mesh::OrganMeshError,
+    organ::{image::OrganImageError, mesh::OrganMeshError},
     vessels::lineage::Lineage,
 };
 use crate::synthesis::{
-    growth::{GrownTree, Growth, GrowthWarning, TreeUpdate},
-    tissue::Tissue,
-    tree::{ByKind, VesselKind},
+    growth::{Growth, GrowthWarning},
+    tissue::{Tissue, TissuePaint},
+    tree::ByKind,
 };
-use bevy::{asset::AssetId, ecs::component::Component, mesh::Mesh};
-use std::{sync::Arc, time::Duration};
-
-/// A tissue, or why there is none.
-pub(crate) type Prepared = Result<Arc<dyn Tissue>, OrganGrowthError>;
-
-/// What must be done before an organ can grow on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Need {
-    /// Nothing.
-    #[default]
-    Nothing,
-    /// To start the growth again, on the same tissue.
-    Growth,
-    /// To prepare the tissue, then to start the growth.
-    Tissue,
-}
+use bevy::{asset::AssetId, ecs::component::Component, image::Image, mesh::Mesh};
+use std::sync::Arc;
 
 /// The growth of an organ under way. For reading: the plugin drives it.
 #[derive(Component, Debug, Default)]
 pub struct GrowthState {
     /// What must be done next.
     pub(crate) need: Need,
-    /// The wishes and the mesh that the growth follows, or is about to.
-    followed: Option<(Vasculature, Option<AssetId<Mesh>>)>,
-    /// A tissue being prepared. To let go of the job stops it, so that no outdated tissue ever arrives.
-    preparation: Option<Job<Prepared>>,
-    tissue: Option<Arc<dyn Tissue>>,
-    /// Which tissue it is, or will be when it is ready.
+    /// What the growth follows, or is about to.
+    followed: Option<Followed>,
+    /// A tissue being prepared or painted. To let go of the job stops it, so that no outdated tissue ever arrives.
+    preparation: Option<Job<Painted>>,
+    /// Whether what is about to start grows beside vessels that stay until then.
+    beside: bool,
+    pub(super) tissue: Option<PaintedTissue>,
+    /// Which tissue it is, or will be when it is ready, whatever is painted on it.
     tissue_lineage: Lineage,
-    growth: Option<Box<dyn Growth>>,
+    pub(super) growth: Option<Box<dyn Growth>>,
+    /// What will take the place of the growth.
+    pub(super) successor: Option<Successor>,
     /// Which trees are those of the growth.
-    lineages: ByKind<Lineage>,
+    pub(super) lineages: ByKind<Lineage>,
     error: Option<OrganGrowthError>,
     /// Warnings that have been given for the settings.
     warned: Vec<GrowthWarning>,
     /// Steps that the growth had done when its organ was saved, and does again at once.
-    arrears: u32,
+    pub(super) arrears: u32,
     /// Steps that a paused growth may still do.
-    granted: u32,
+    pub(super) granted: u32,
     /// Whether all remaining steps are to be done at once.
     pub(crate) finish: bool,
     /// Whether steps were done whose radii are not known yet.
-    unsettled: bool,
+    pub(super) unsettled: bool,
     /// Nodes whose radius changed since the vessels were last published.
-    changed: ByKind<Vec<u32>>,
+    pub(super) changed: ByKind<Vec<u32>>,
     /// Which vessels are to be published anew, from the first node on.
-    rebuild: ByKind<bool>,
-    costs: Costs,
-}
-
-/// What steps have cost.
-#[derive(Debug, Default)]
-struct Costs {
-    steps: LastCosts,
-    /// Settling and publishing, for each step that was published.
-    publishing: LastCosts,
-    /// Settling, since the vessels were last published.
-    settling: Duration,
-    /// Steps that haven't been published.
-    unpublished: u32,
+    pub(super) rebuild: ByKind<bool>,
+    pub(super) costs: Costs,
 }
 
 impl GrowthState {
@@ -85,9 +67,14 @@ impl GrowthState {
         self.growth.as_deref()
     }
 
-    /// The tissue that is supplied. `None` until it is ready.
+    /// What grows unseen on a tissue that was painted anew, and will take the place of the [`growth`](Self::growth).
+    pub fn successor(&self) -> Option<&dyn Growth> {
+        self.successor.as_ref().map(|successor| &*successor.growth)
+    }
+
+    /// The tissue that is supplied, with what is painted on it. `None` until it is ready.
     pub fn tissue(&self) -> Option<&dyn Tissue> {
-        self.tissue.as_deref()
+        self.tissue.as_ref().map(|painted| &*painted.tissue)
     }
 
     /// Why the growth failed, if it did.
@@ -119,15 +106,22 @@ impl GrowthState {
     }
 
     /// Compares what is wished for with what the growth follows, and demands what the difference needs.
-    pub(crate) fn follow(&mut self, vasculature: &Vasculature, mesh: Option<AssetId<Mesh>>) {
-        let need = difference(self.followed.as_ref(), vasculature, mesh);
-        if need != Need::Nothing {
-            if self.followed.as_ref().is_some_and(|(before, _)| before != vasculature) {
-                self.arrears = 0;
-            }
-            self.followed = Some((vasculature.clone(), mesh));
-            self.demand(need);
+    pub(crate) fn follow(&mut self, wish: &Vasculature, paint: &TissuePaint, assets: SourceAssets) {
+        let Some(followed) = &mut self.followed else {
+            self.followed = Some(Followed { wish: wish.clone(), paint: Arc::new(paint.clone()), assets });
+            self.demand(Need::Tissue);
+            return;
+        };
+        let need = followed.need(wish, paint, assets);
+        followed.assets = assets;
+        if followed.wish != *wish {
+            followed.wish.clone_from(wish);
+            self.arrears = 0;
         }
+        if *followed.paint != *paint {
+            followed.paint = Arc::new(paint.clone());
+        }
+        self.demand(need);
     }
 
     /// Takes note of how far the growth of an organ was that comes from a scene or is a clone.
@@ -137,20 +131,28 @@ impl GrowthState {
         }
     }
 
-    /// Whether there are steps to be done again at once.
-    pub(crate) fn is_in_arrears(&self) -> bool {
-        self.arrears > 0 && self.growth.is_some()
+    /// Whether the growth follows other assets than these.
+    pub(crate) fn follows_other_assets(&self, assets: SourceAssets) -> bool {
+        self.followed.as_ref().is_none_or(|followed| followed.assets != assets)
     }
 
-    /// Whether the growth follows another mesh asset than this one.
-    pub(crate) fn follows_other_mesh(&self, mesh: Option<AssetId<Mesh>>) -> bool {
-        self.followed.as_ref().is_none_or(|(_, followed)| *followed != mesh)
+    /// What is painted on the tissue, or is about to be.
+    pub(crate) fn paint(&self) -> Arc<TissuePaint> {
+        self.followed.as_ref().map(|followed| Arc::clone(&followed.paint)).unwrap_or_default()
     }
 
     /// Takes note that a mesh asset has new content (`replaced`), or has been loaded at last.
     pub(crate) fn notice_mesh(&mut self, mesh: AssetId<Mesh>, replaced: bool) {
         let was_missing = matches!(self.error, Some(OrganGrowthError::Mesh(OrganMeshError::NotLoaded { .. })));
-        if (replaced || was_missing) && !self.follows_other_mesh(Some(mesh)) {
+        if (replaced || was_missing) && self.followed.as_ref().is_some_and(|followed| followed.is_of_mesh(mesh)) {
+            self.demand(Need::Tissue);
+        }
+    }
+
+    /// Takes note that an image asset has new content (`replaced`), or has been loaded at last.
+    pub(crate) fn notice_image(&mut self, image: AssetId<Image>, replaced: bool) {
+        let was_missing = matches!(self.error, Some(OrganGrowthError::Image(OrganImageError::NotLoaded { .. })));
+        if (replaced || was_missing) && self.followed.as_ref().is_some_and(|followed| followed.is_of_image(image)) {
             self.demand(Need::Tissue);
         }
     }
@@ -163,15 +165,21 @@ impl GrowthState {
     pub(crate) fn hasten(&mut self) {
         self.finish = true;
         if self.preparation.take().is_some() {
-            self.demand(Need::Tissue);
+            self.demand(if self.tissue.is_none() {
+                Need::Tissue
+            } else if self.beside {
+                Need::Paint
+            } else {
+                Need::Growth
+            });
         }
     }
 
-    /// What there is to do now. A growth without a tissue needs one first, unless it is on its way.
+    /// What there is to do now. What needs a tissue needs that first, unless it is on its way.
     pub(crate) fn next_need(&self) -> Need {
         match self.need {
-            Need::Growth if self.tissue.is_none() && self.preparation.is_some() => Need::Nothing,
-            Need::Growth if self.tissue.is_none() => Need::Tissue,
+            Need::Growth | Need::Paint if self.tissue.is_none() && self.preparation.is_some() => Need::Nothing,
+            Need::Growth | Need::Paint if self.tissue.is_none() => Need::Tissue,
             need => need,
         }
     }
@@ -182,14 +190,48 @@ impl GrowthState {
         self.tissue = None;
         self.tissue_lineage = Lineage::new_one();
         self.error = None;
+        self.beside = false;
+        self.successor = None;
         if self.growth.take().is_some() {
             self.begin_trees();
         }
     }
 
+    /// Decides whether a growth that is about to start on other paint grows beside the vessels that are drawn. It does if
+    /// there are any.
+    pub(crate) fn choose_place(&mut self, need: Need) {
+        let has_grown = |growth: &dyn Growth| growth.is_finished() || growth.progress().done > 0;
+        self.beside = need == Need::Paint && self.growth().is_some_and(has_grown);
+    }
+
+    /// Whether what is about to start grows beside vessels that stay until then.
+    pub(crate) fn is_beside(&self) -> bool {
+        self.beside
+    }
+
+    /// Forgets about successors if the vessels that are drawn grew on what is painted now: a stroke was taken back.
+    pub(crate) fn takes_back(&mut self) -> bool {
+        let is_drawn = self.tissue.as_ref().is_some_and(|tissue| *tissue.paint == *self.paint());
+        let takes_back = self.beside && is_drawn;
+        if takes_back {
+            (self.successor, self.preparation, self.error) = (None, None, None);
+            self.need = Need::Nothing;
+            self.beside = false;
+        }
+        takes_back
+    }
+
+    /// The tissue at hand, with what is painted now where it has been painted already.
+    pub(crate) fn tissue_at_hand(&self) -> Option<&PaintedTissue> {
+        let paint = self.paint();
+        let painted = self.successor.as_ref().map(|successor| &successor.tissue).into_iter().chain(&self.tissue);
+        painted.clone().find(|tissue| *tissue.paint == *paint).or(self.tissue.as_ref())
+    }
+
     /// Waits for a tissue from now on.
-    pub(crate) fn await_tissue(&mut self, preparation: Job<Prepared>) {
+    pub(crate) fn await_tissue(&mut self, preparation: Job<Painted>) {
         self.preparation = Some(preparation);
+        self.successor = None;
         self.need = Need::Nothing;
     }
 
@@ -203,44 +245,57 @@ impl GrowthState {
         self.preparation.as_ref().map(Job::progress)
     }
 
-    /// The result of the preparation, once it is there.
-    pub(crate) fn poll_preparation(&mut self) -> Option<Prepared> {
-        Job::poll(&mut self.preparation)
+    /// The result of the preparation, once it is there. `None` too where something else has been painted meanwhile: the
+    /// tissue is kept, to be painted again.
+    pub(crate) fn poll_preparation(&mut self) -> Option<Painted> {
+        match Job::poll(&mut self.preparation)? {
+            Ok(tissue) if *tissue.paint != *self.paint() => {
+                self.tissue.get_or_insert(tissue);
+                None
+            }
+            result => Some(result),
+        }
     }
 
-    /// Starts the growth on a new tissue, or on the one at hand, where its buffers are used again.
+    /// Starts the growth on a tissue, where buffers are used again if it is the one at hand.
     ///
     /// Gives the warnings about the settings that have not been given before.
     pub(crate) fn start(
         &mut self,
-        new_tissue: Option<Arc<dyn Tissue>>,
+        painted: PaintedTissue,
         wish: &Vasculature,
     ) -> Result<Vec<GrowthWarning>, OrganGrowthError> {
-        if let Some(tissue) = new_tissue {
-            self.growth = None;
-            self.tissue = Some(tissue);
-        }
         self.need = Need::Nothing;
+        self.preparation = None;
+        self.successor = None;
         self.error = None;
-        self.begin_trees();
-        self.costs = Costs::default();
-        let Some(tissue) = self.tissue.clone() else { return Ok(Vec::new()) };
+        let tissue = Arc::clone(&painted.tissue);
         let mut generator = wish.generator.clone();
         if wish.fit {
             generator = generator.fit(tissue.extent());
         }
         let roots = wish.roots.clone().into();
-        let growth = match self.growth.take() {
-            Some(growth) => generator.restart(growth, tissue, &roots, wish.seed),
-            None => generator.start(tissue, &roots, wish.seed),
-        }?;
-        let warnings = growth.warnings();
-        self.growth = Some(growth);
+        let warnings = if let (true, Some(drawn)) = (self.beside, &self.growth) {
+            let growth = generator.start(tissue, &roots, wish.seed)?;
+            let warnings = growth.warnings();
+            self.successor = Some(Successor::of(&**drawn, painted, growth));
+            warnings
+        } else {
+            self.begin_trees();
+            self.costs = Costs::default();
+            self.tissue = Some(painted);
+            let growth = match self.growth.take() {
+                Some(growth) => generator.restart(growth, tissue, &roots, wish.seed),
+                None => generator.start(tissue, &roots, wish.seed),
+            }?;
+            self.growth.insert(growth).warnings()
+        };
+        self.beside = false;
         Ok(self.unheard(warnings))
     }
 
     /// The trees from now on are other ones than before.
-    fn begin_trees(&mut self) {
+    pub(super) fn begin_trees(&mut self) {
         self.lineages = ByKind::from_fn(|_| Lineage::new_one());
         self.rebuild = ByKind::from_fn(|_| true);
     }
@@ -252,160 +307,37 @@ impl GrowthState {
     }
 
     /// Ends what is under way because of an error. Vessels of an earlier growth go, too: they are not what is wished for.
+    /// Those that were to stay until their successors are there stay.
     pub(crate) fn fail(&mut self, error: OrganGrowthError) {
         self.need = Need::Nothing;
         self.preparation = None;
-        self.growth = None;
-        self.begin_trees();
+        self.successor = None;
+        if !std::mem::take(&mut self.beside) {
+            self.growth = None;
+            self.begin_trees();
+        }
         self.finish = false;
         self.error = Some(error);
     }
 
-    /// Whether a step may be done now.
-    pub(crate) fn may_step(&self, control: GrowthControl) -> bool {
-        let willing = control == GrowthControl::Running || self.granted > 0 || self.finish;
-        willing && self.growth().is_some_and(|growth| !growth.is_finished())
-    }
-
-    /// Does one step, whose radii are to be [settled](Self::settle). Without a growth, or at its end, nothing is done.
-    pub(crate) fn step(&mut self) {
-        let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { return };
-        growth.advance();
-        self.granted = self.granted.saturating_sub(1);
-        self.unsettled = true;
-    }
-
-    /// Whether there are steps whose radii are to be settled.
-    pub(crate) fn is_unsettled(&self) -> bool {
-        self.unsettled
-    }
-
-    /// Renews the radii after a frame's last step, and remembers what the steps changed. Many steps change the same radii,
-    /// those of the trunks: once is enough.
-    pub(crate) fn settle(&mut self) {
-        self.unsettled = false;
-        let Some(growth) = self.growth.as_mut() else { return };
-        growth.settle();
-        self.take_updates();
-    }
-
-    /// Remembers what the last settling changed.
-    fn take_updates(&mut self) {
-        let Some(growth) = &self.growth else { return };
-        for kind in VesselKind::ALL {
-            match growth.update(kind) {
-                TreeUpdate::Grown { .. } if self.rebuild[kind] => {}
-                TreeUpdate::Grown { changed } => self.changed[kind].extend_from_slice(changed),
-                TreeUpdate::Replaced => {
-                    self.lineages[kind] = Lineage::new_one();
-                    self.rebuild[kind] = true;
-                }
-            }
+    /// What a growth that has not failed is at.
+    pub(crate) fn phase(&self) -> GrowthPhase {
+        match (self.successor(), self.growth()) {
+            (Some(_), _) => GrowthPhase::Regrowing,
+            (None, Some(growth)) if growth.is_finished() => GrowthPhase::Finished,
+            (None, _) => GrowthPhase::Growing,
         }
     }
 
-    /// Takes note of what settling cost.
-    pub(crate) fn note_settling(&mut self, cost: Duration) {
-        self.costs.settling += cost;
-    }
-
-    /// Takes note of what a step cost.
-    pub(crate) fn note_step(&mut self, cost: Duration) {
-        self.costs.steps.add(cost);
-        self.costs.unpublished += 1;
-    }
-
-    /// What the next step is expected to cost.
-    pub(crate) fn expected_cost(&self) -> StepCost {
-        StepCost { step: self.costs.steps.expected(), publish: self.costs.publishing.expected() }
-    }
-
-    /// Does the steps again that were done before the organ was saved.
-    pub(crate) fn catch_up(&mut self) {
-        for _ in 0..std::mem::take(&mut self.arrears) {
-            let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { break };
-            growth.advance();
-        }
-        self.settle();
-    }
-
-    /// Does all remaining steps.
-    pub(crate) fn run(&mut self) {
-        // With so many steps, taking everything anew is cheaper than to remember every change.
-        self.rebuild = ByKind::from_fn(|_| true);
-        self.finish = false;
-        if let Some(growth) = self.growth.as_mut() {
-            growth.run();
-        }
-        self.take_updates();
-    }
-
-    /// Whether there is something to publish.
-    pub(crate) fn has_news(&self) -> bool {
-        self.rebuild.values().any(|&rebuild| rebuild) || self.changed.values().any(|changed| !changed.is_empty())
-    }
-
-    /// What is to be published of a kind: its tree and the nodes that changed, `None` for all of them.
-    pub(crate) fn news(&self, kind: VesselKind) -> (Option<GrownTree<'_>>, Option<&[u32]>) {
-        let changed = (!self.rebuild[kind]).then_some(self.changed[kind].as_slice());
-        (self.growth.as_ref().and_then(|growth| growth.trees()[kind]), changed)
-    }
-
-    /// Which tree that of a kind is: another one after each start, and where the generator replaced it.
-    pub(crate) fn lineage(&self, kind: VesselKind) -> Lineage {
-        self.lineages[kind]
-    }
-
-    /// Which tissue it grows on: another one after each preparation.
+    /// Which tissue it grows on: another one after each preparation, and the same whatever is painted on it.
     pub(crate) fn tissue_lineage(&self) -> Lineage {
         self.tissue_lineage
-    }
-
-    /// Forgets what has been published, at this cost.
-    pub(crate) fn clear_news(&mut self, cost: Duration) {
-        let cost = cost + std::mem::take(&mut self.costs.settling);
-        if let Some(each) = cost.checked_div(std::mem::take(&mut self.costs.unpublished)) {
-            self.costs.publishing.add(each);
-        }
-        self.rebuild = ByKind::default();
-        self.changed.values_mut().for_each(Vec::clear);
-    }
-}
-
-/// What the difference between the followed wishes and the present ones needs.
-fn difference(
-    followed: Option<&(Vasculature, Option<AssetId<Mesh>>)>,
-    wish: &Vasculature,
-    mesh: Option<AssetId<Mesh>>,
-) -> Need {
-    match followed {
-        Some((old, old_mesh)) if old.tissue == wish.tissue && *old_mesh == mesh => {
-            if old == wish {
-                Need::Nothing
-            } else {
-                Need::Growth
-            }
-        }
-        _ => Need::Tissue,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use crate::plugin::growth::state::*;
-
-    #[test]
-    fn only_mesh_and_tissue_need_a_new_tissue() {
-        let old = Vasculature::default();
-        let mesh = Some(AssetId::default());
-        let followed = (old.clone(), mesh);
-        assert_eq!(difference(None, &old, mesh), Need::Tissue);
-        assert_eq!(difference(Some(&followed), &old, mesh), Need::Nothing);
-        assert_eq!(difference(Some(&followed), &old, None), Need::Tissue);
-        assert_eq!(difference(Some(&followed), &old.clone().with_seed(1), mesh), Need::Growth);
-        let unfitted = Vasculature { fit: false, ..old };
-        assert_eq!(difference(Some(&followed), &unfitted, mesh), Need::Growth);
-    }
 
     #[test]
     fn a_restart_without_tissue_prepares_it() {

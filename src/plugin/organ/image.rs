@@ -38,7 +38,9 @@ pub enum OrganImageError {
     )]
     OnGpuOnly,
     /// The pixels cannot be read.
-    #[error("the image's pixels cannot be read ({reason}); use an uncompressed format such as R8Unorm or Rgba8UnormSrgb")]
+    #[error(
+        "the image's pixels cannot be read ({reason}); use an uncompressed format such as R8Unorm or Rgba8UnormSrgb"
+    )]
     Unreadable {
         /// What Bevy says.
         reason: String,

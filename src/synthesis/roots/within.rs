@@ -152,12 +152,10 @@ fn leads_through(tissue: &dyn Tissue, [from, to]: [TissuePoint; 2]) -> bool {
         return false;
     }
     let allowed = GAP * way.length();
-    (1..=BETWEEN)
-        .map(|step| from.position + way * (step as f32 / (BETWEEN + 1) as f32))
-        .all(|between| {
-            tissue.closest_point(between).position.distance_squared(between) <= allowed * allowed
-                && !tissue.no_go().is_some_and(|no_go| no_go.forbids(between))
-        })
+    (1..=BETWEEN).map(|step| from.position + way * (step as f32 / (BETWEEN + 1) as f32)).all(|between| {
+        tissue.closest_point(between).position.distance_squared(between) <= allowed * allowed
+            && !tissue.no_go().is_some_and(|no_go| no_go.forbids(between))
+    })
 }
 
 /// Of equally far ones the first.

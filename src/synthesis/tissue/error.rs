@@ -101,16 +101,22 @@ pub enum TissueError {
     #[error("a staged tissue cannot be painted; prepare and paint its stages")]
     PaintOverStages,
     /// Something painted on the vertices of a tissue that has none.
-    #[error("{what} is painted on vertices, but the tissue is not made of a mesh; leave it out, or mark balls and boxes")]
+    #[error(
+        "{what} is painted on vertices, but the tissue is not made of a mesh; leave it out, or mark balls and boxes"
+    )]
     NoVertices {
         /// What is painted.
         what: &'static str,
     },
     /// A tissue that is to be made of a mesh without one.
-    #[error("the tissue is to be made of the organ's mesh, but there is none; give the organ a mesh, or choose a shape")]
+    #[error(
+        "the tissue is to be made of the organ's mesh, but there is none; give the organ a mesh, or choose a shape"
+    )]
     NoMesh,
     /// A tissue that is to be made of an image without one.
-    #[error("the tissue is to be made of the organ's image, but there is none; give the organ an image, or choose a shape")]
+    #[error(
+        "the tissue is to be made of the organ's image, but there is none; give the organ an image, or choose a shape"
+    )]
     NoImage,
     /// A staged tissue as the stage of another.
     #[error("a stage of a staged tissue cannot be staged itself; list its stages instead")]

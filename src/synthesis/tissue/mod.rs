@@ -43,7 +43,9 @@ pub use path::GuidePath;
 pub use pieces::TissuePiece;
 pub use prepared::PreparedTissue;
 pub use shape::{Ball, Cuboid, Disc, Ellipsoid, Rectangle};
-pub use source::{ImageChannel, ImageTissue, MeshTissue, SourceData, TissueImage, TissueMode, TissueShape, TissueSource};
+pub use source::{
+    ImageChannel, ImageTissue, MeshTissue, SourceData, TissueImage, TissueMode, TissueShape, TissueSource,
+};
 pub use staged::Staged;
 pub use surface::MeshSurface;
 pub use volume::MeshVolume;

@@ -1,0 +1,175 @@
+//! Steps of an organ's growth, what they cost, and what they changed.
+
+use crate::plugin::{
+    growth::{
+        budget::{LastCosts, StepCost},
+        progress::GrowthControl,
+        state::GrowthState,
+        successor::Successor,
+    },
+    vessels::lineage::Lineage,
+};
+use crate::synthesis::{
+    growth::{GrownTree, Growth, TreeUpdate},
+    tree::{ByKind, VesselKind},
+};
+use std::time::Duration;
+
+/// What steps have cost.
+#[derive(Debug, Default)]
+pub(crate) struct Costs {
+    steps: LastCosts,
+    /// Settling and publishing, for each step that was published.
+    publishing: LastCosts,
+    /// Settling, since the vessels were last published.
+    settling: Duration,
+    /// Steps that haven't been published.
+    unpublished: u32,
+}
+
+impl GrowthState {
+    /// Whether there are steps to be done again at once.
+    pub(crate) fn is_in_arrears(&self) -> bool {
+        self.arrears > 0 && self.growth.is_some()
+    }
+
+    /// What steps are done of: the growth, or what will take its place.
+    pub(crate) fn active(&self) -> Option<&dyn Growth> {
+        self.successor().or(self.growth())
+    }
+
+    fn active_mut(&mut self) -> Option<&mut Box<dyn Growth>> {
+        self.successor.as_mut().map(|successor| &mut successor.growth).or(self.growth.as_mut())
+    }
+
+    /// Whether there are steps left to do.
+    pub(crate) fn is_growing(&self) -> bool {
+        self.error().is_none() && self.active().is_some_and(|growth| !growth.is_finished())
+    }
+
+    /// Whether all steps are done, and what they came to is what is drawn.
+    pub(crate) fn is_done(&self) -> bool {
+        self.error().is_none() && self.active().is_some_and(|growth| growth.is_finished()) && self.successor.is_none()
+    }
+
+    /// Whether a step may be done now.
+    pub(crate) fn may_step(&self, control: GrowthControl) -> bool {
+        let willing = control == GrowthControl::Running || self.granted > 0 || self.finish;
+        willing && self.is_growing()
+    }
+
+    /// Does one step, whose radii are to be [settled](Self::settle). Without a growth, or at its end, nothing is done.
+    pub(crate) fn step(&mut self) {
+        let Some(growth) = self.active_mut().filter(|growth| !growth.is_finished()) else { return };
+        growth.advance();
+        self.granted = self.granted.saturating_sub(1);
+        self.unsettled = true;
+    }
+
+    /// Whether there are steps whose radii are to be settled.
+    pub(crate) fn is_unsettled(&self) -> bool {
+        self.unsettled
+    }
+
+    /// Renews the radii after a frame's last step, and remembers what the steps changed. Many steps change the same radii,
+    /// those of the trunks: once is enough. Those of a growth that nobody sees can wait.
+    pub(crate) fn settle(&mut self) {
+        self.unsettled = false;
+        if self.successor.is_some() {
+            self.succeed();
+            return;
+        }
+        let Some(growth) = self.growth.as_mut() else { return };
+        growth.settle();
+        self.take_updates();
+    }
+
+    /// Puts a successor that has come as far as what is drawn in the place of that.
+    fn succeed(&mut self) {
+        let Some(Successor { tissue, mut growth, .. }) = self.successor.take_if(|successor| successor.has_caught_up())
+        else {
+            return;
+        };
+        growth.settle();
+        (self.tissue, self.growth) = (Some(tissue), Some(growth));
+        self.begin_trees();
+    }
+
+    /// Remembers what the last settling changed.
+    fn take_updates(&mut self) {
+        let Some(growth) = &self.growth else { return };
+        for kind in VesselKind::ALL {
+            match growth.update(kind) {
+                TreeUpdate::Grown { .. } if self.rebuild[kind] => {}
+                TreeUpdate::Grown { changed } => self.changed[kind].extend_from_slice(changed),
+                TreeUpdate::Replaced => {
+                    self.lineages[kind] = Lineage::new_one();
+                    self.rebuild[kind] = true;
+                }
+            }
+        }
+    }
+
+    /// Takes note of what settling cost.
+    pub(crate) fn note_settling(&mut self, cost: Duration) {
+        self.costs.settling += cost;
+    }
+
+    /// Takes note of what a step cost.
+    pub(crate) fn note_step(&mut self, cost: Duration) {
+        self.costs.steps.add(cost);
+        self.costs.unpublished += 1;
+    }
+
+    /// What the next step is expected to cost.
+    pub(crate) fn expected_cost(&self) -> StepCost {
+        StepCost { step: self.costs.steps.expected(), publish: self.costs.publishing.expected() }
+    }
+
+    /// Does the steps again that were done before the organ was saved.
+    pub(crate) fn catch_up(&mut self) {
+        for _ in 0..std::mem::take(&mut self.arrears) {
+            let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { break };
+            growth.advance();
+        }
+        self.settle();
+    }
+
+    /// Does all remaining steps.
+    pub(crate) fn run(&mut self) {
+        // With so many steps, taking everything anew is cheaper than to remember every change.
+        self.rebuild = ByKind::from_fn(|_| true);
+        self.finish = false;
+        if let Some(growth) = self.active_mut() {
+            growth.run();
+        }
+        self.succeed();
+        self.take_updates();
+    }
+
+    /// Whether there is something to publish.
+    pub(crate) fn has_news(&self) -> bool {
+        self.rebuild.values().any(|&rebuild| rebuild) || self.changed.values().any(|changed| !changed.is_empty())
+    }
+
+    /// What is to be published of a kind: its tree and the nodes that changed, `None` for all of them.
+    pub(crate) fn news(&self, kind: VesselKind) -> (Option<GrownTree<'_>>, Option<&[u32]>) {
+        let changed = (!self.rebuild[kind]).then_some(self.changed[kind].as_slice());
+        (self.growth.as_ref().and_then(|growth| growth.trees()[kind]), changed)
+    }
+
+    /// Which tree that of a kind is: another one after each start, and where the generator replaced it.
+    pub(crate) fn lineage(&self, kind: VesselKind) -> Lineage {
+        self.lineages[kind]
+    }
+
+    /// Forgets what has been published, at this cost.
+    pub(crate) fn clear_news(&mut self, cost: Duration) {
+        let cost = cost + std::mem::take(&mut self.costs.settling);
+        if let Some(each) = cost.checked_div(std::mem::take(&mut self.costs.unpublished)) {
+            self.costs.publishing.add(each);
+        }
+        self.rebuild = ByKind::default();
+        self.changed.values_mut().for_each(Vec::clear);
+    }
+}
