@@ -70,10 +70,12 @@ impl PreparedTissue {
         let surface = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
             let surface = MeshSurface::new_paced(Arc::clone(&mesh), &pace).await?;
             indexed.get_or_init(|| surface.indexed().clone());
-            Ok(Arc::new(surface))
+            let surface: Arc<dyn Tissue> = Arc::new(surface);
+            Ok(surface)
         };
         let volume = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
-            Ok(Arc::new(MeshVolume::new_paced(&mesh, settings.resolution, &pace).await?))
+            let volume: Arc<dyn Tissue> = Arc::new(MeshVolume::new_paced(&mesh, settings.resolution, &pace).await?);
+            Ok(volume)
         };
         let (stages, last) = match settings.mode {
             TissueMode::Surface => (Vec::new(), surface(pace.clone()).await?),
