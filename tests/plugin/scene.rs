@@ -132,10 +132,12 @@ fn assert_no_ghosts(world: &mut World, organs: &[Entity]) {
         vessel_entities.extend(entities);
     }
     let mut all: Vec<Entity> = world.query_filtered::<Entity, With<OpenEnd>>().iter(world).collect();
-    [&mut all, &mut known].map(|list| list.sort_unstable());
+    all.sort_unstable();
+    known.sort_unstable();
     assert_eq!(all, known);
     let mut all: Vec<Entity> = world.query_filtered::<Entity, With<Vessels>>().iter(world).collect();
-    [&mut all, &mut vessel_entities].map(|list| list.sort_unstable());
+    all.sort_unstable();
+    vessel_entities.sort_unstable();
     assert_eq!(all, vessel_entities);
 }
 
