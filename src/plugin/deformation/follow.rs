@@ -64,7 +64,7 @@ pub struct FollowsMesh;
 /// flow and what is ischaemic stay as they are at rest. Removing this brings the vessels back to rest.
 ///
 /// ```
-/// # use bevy_vessels::{plugin::FollowsTetrahedra, synthesis::binding::{TetMesh, TetMeshError}};
+/// # use bevy_vessels::{plugin::FollowsTetrahedra, synthesis::mesh::{TetMesh, TetMeshError}};
 /// # use bevy::prelude::{Query, Vec3};
 /// fn tetrahedra() -> Result<FollowsTetrahedra, TetMeshError> {
 ///     let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
