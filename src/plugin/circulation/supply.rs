@@ -96,7 +96,7 @@ struct Order {
 /// What is measured with: the first time, it is to be made from a copy of the flow and the organ's vertices.
 enum Source {
     Gauge(Box<SupplyGauge>),
-    New { flow: OrganFlow, vertices: Vec<Vec3> },
+    New { flow: Box<OrganFlow>, vertices: Vec<Vec3> },
 }
 
 impl Order {
@@ -104,7 +104,7 @@ impl Order {
         let (mut gauge, pace) = match self.source {
             Source::Gauge(gauge) => (gauge, pace),
             Source::New { flow, vertices } => {
-                let gauge = SupplyGauge::new(flow, &vertices, &pace.part(0.0..0.8)).await?;
+                let gauge = SupplyGauge::new(*flow, &vertices, &pace.part(0.0..0.8)).await?;
                 (Box::new(gauge), pace.part(0.8..1.0))
             }
         };
@@ -162,7 +162,7 @@ impl SuppliedItem<'_, '_> {
         let source = match gauge {
             Some(gauge) => Source::Gauge(gauge),
             None => {
-                let (flow, vertices) = (flow.copy(), self.vertices(meshes));
+                let (flow, vertices) = (Box::new(flow.copy()), self.vertices(meshes));
                 work += vertices.len();
                 Source::New { flow, vertices }
             }

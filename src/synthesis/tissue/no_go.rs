@@ -197,9 +197,10 @@ impl Tissue for NoGoTissue {
     }
 
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
-        let mut kept = candidates.len();
+        let first = candidates.len();
+        let mut kept = first;
         self.tissue.draw(rng, count, candidates);
-        for index in kept..candidates.len() {
+        for index in first..candidates.len() {
             if !self.field.forbids(candidates[index]) {
                 candidates[kept] = candidates[index];
                 kept += 1;
