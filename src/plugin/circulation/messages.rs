@@ -50,8 +50,8 @@ pub struct BleedingStopped {
     pub entity: Option<Entity>,
 }
 
-/// The blood of an organ can't flow. Other organs are not affected; a change of its [`Perfusion`] makes it try again.
-/// Also an event on the organ, for observers.
+/// The blood of an organ can't flow. Other organs are not affected; a change of its
+/// [`Perfusion`](crate::plugin::Perfusion) makes it try again. Also an event on the organ, for observers.
 #[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Message, Event, Clone, PartialEq)]
 pub struct CirculationFailed {

@@ -12,7 +12,8 @@ use bevy::{
 };
 use std::sync::Arc;
 
-/// An organ's mesh at rest. The plugin keeps it for organs with [`FollowsMesh`] or [`FollowsTetrahedra`].
+/// An organ's mesh at rest. The plugin keeps it for organs with [`FollowsMesh`](crate::plugin::FollowsMesh) or
+/// [`FollowsTetrahedra`](crate::plugin::FollowsTetrahedra).
 #[derive(Component, Clone, Default)]
 pub struct RestMesh {
     pub(crate) copy: Option<Arc<MeshCopy>>,

@@ -20,8 +20,8 @@ use std::{collections::BTreeMap, ops::Range};
 /// calls take the tree that the wounds belong to; after another one took its place, [`clear`](Self::clear).
 ///
 /// `candidates(region, visit)` is the index over the tree's segments: it calls `visit` with at least those that meet a
-/// region, as [`SegmentIndex::candidates_in`](super::SegmentIndex::candidates_in) does. A cut asks more of it, which the
-/// same closure answers: see [`SegmentSearch`].
+/// region, as [`SegmentIndex::candidates_in`](crate::synthesis::segment_index::SegmentIndex::candidates_in) does. A cut
+/// asks more of it, which the same closure answers: see [`SegmentSearch`].
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(into = "SavedWounds", try_from = "SavedWounds"))]
