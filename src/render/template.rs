@@ -13,7 +13,7 @@
 //! A level's vertices, slid to the next coarser one, are that level, vertex for vertex, and slide on as its own do. So a
 //! chunk can go from one mesh to the next without a visible change, however thick and thin its segments are.
 
-use super::detail::{Goal, Level, Shape};
+use super::levels::{Goal, Level, Shape, corner_reach};
 use bevy::{
     asset::RenderAssetUsages,
     math::ops,
@@ -179,18 +179,10 @@ fn corner(side: u32, sides: u32) -> [f32; 2] {
     [reach * cos, reach * sin]
 }
 
-/// Distance of a regular polygon's corners from its centre, where its mean width is 2.
-///
-/// The mean width of a convex figure is its perimeter over π (Cauchy).
-pub(super) fn corner_reach(sides: u32) -> f32 {
-    let half_turn = TAU / 2.0 / sides as f32;
-    half_turn / ops::sin(half_turn)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::detail::{Detail, Shape};
+    use crate::render::levels::Detail;
     use bevy::{math::Vec3, mesh::VertexAttributeValues};
     use std::collections::BTreeSet;
 
