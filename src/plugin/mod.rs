@@ -24,6 +24,7 @@ mod circulation;
 mod deformation;
 mod growth;
 mod job;
+mod lineage;
 mod order;
 mod organ;
 mod scene;

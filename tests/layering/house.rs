@@ -128,7 +128,7 @@ mod tests {
         let child = ("src/a/child.rs", "use super::Parent; pub struct Child; pub fn f() -> Parent {}");
         assert!(circles(&[hands_on, child]).is_empty());
         for parent in [uses, calls] {
-            assert_eq!(circles(&[parent, child]), [["src/a/child.rs", "src/a/mod.rs"]]);
+            assert_eq!(circles(&[parent, child]), [["src/a/mod.rs", "src/a/child.rs"]]);
         }
     }
 

@@ -1,5 +1,7 @@
 //! A source file, as the rules see it: its text without comments, literals and unit tests, and the paths it names.
 
+use std::collections::BTreeSet;
+
 /// A source file.
 pub struct Source {
     /// Path from the project's root, with `/`.
@@ -56,7 +58,8 @@ impl Source {
 
     /// The same without what the file only hands on to others.
     pub fn used_paths(&self) -> impl Iterator<Item = &[String]> {
-        let is_used = |import: &&Use| !import.is_public || words(&self.body).iter().any(|word| word.1 == import.name);
+        let named: BTreeSet<&str> = words(&self.body).into_iter().map(|(_, word)| word).collect();
+        let is_used = move |import: &&Use| !import.is_public || named.contains(&*import.name);
         let imported = self.uses.iter().filter(is_used).map(|import| &import.path[..]);
         imported.chain(self.inline.iter().map(Vec::as_slice))
     }

@@ -4,12 +4,12 @@
 //! [`OpenEnd`] entities, [`BloodLoss`](crate::plugin::BloodLoss) and messages.
 
 use crate::plugin::{
-    announcer::Announcer,
     circulation::{
-        flow::{CirculationState, Perfused, PerfusedItem, PerfusedOrgan, PerfusedOrganItem, each_kind},
-        messages::{BleedingStarted, BleedingStopped, CirculationFailed},
+        messages::{BleedingMessages, BleedingStarted, BleedingStopped},
         organ_flow::FlowingEnd,
         patient::{Patient, patient_of},
+        perfused::{Perfused, PerfusedItem, PerfusedOrgan, PerfusedOrganItem, each_kind},
+        state::CirculationState,
     },
     surgery::open_ends::OpenEnd,
     vessels::relations::OrganVessels,
@@ -25,18 +25,10 @@ use bevy::{
         change_detection::{DetectChanges, DetectChangesMut, Res},
         entity::Entity,
         hierarchy::ChildOf,
-        system::{Query, SystemParam},
+        system::Query,
     },
     time::Time,
 };
-
-/// Who is told of bleeding.
-#[derive(SystemParam)]
-pub(crate) struct BleedingMessages<'w, 's> {
-    pub(crate) started: Announcer<'w, 's, BleedingStarted>,
-    pub(crate) stopped: Announcer<'w, 's, BleedingStopped>,
-    pub(crate) failed: Announcer<'w, 's, CirculationFailed>,
-}
 
 /// Lets open ends bleed for as long as the frame lasts.
 pub(crate) fn bleed(

@@ -3,6 +3,7 @@
 //! Each is a message, and an event on the organ, for observers. An open end is named by the fields: the organ is there to
 //! observe before it is cut, and after the end is closed.
 
+use crate::plugin::announcer::Announcer;
 use crate::synthesis::haemodynamics::{EndSide, FlowError};
 use crate::synthesis::wound::EndId;
 use bevy::{
@@ -11,6 +12,7 @@ use bevy::{
         event::EntityEvent,
         message::Message,
         reflect::{ReflectEvent, ReflectMessage},
+        system::SystemParam,
     },
     reflect::Reflect,
 };
@@ -60,4 +62,12 @@ pub struct CirculationFailed {
     pub organ: Entity,
     /// What was wrong, with the value and the remedy.
     pub error: FlowError,
+}
+
+/// Announces what the circulation tells.
+#[derive(SystemParam)]
+pub(crate) struct BleedingMessages<'w, 's> {
+    pub(crate) started: Announcer<'w, 's, BleedingStarted>,
+    pub(crate) stopped: Announcer<'w, 's, BleedingStopped>,
+    pub(crate) failed: Announcer<'w, 's, CirculationFailed>,
 }

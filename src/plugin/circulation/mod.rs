@@ -14,16 +14,19 @@ use bevy::{
 
 pub(crate) mod bleeding;
 pub(crate) mod flow;
+mod gauge;
 pub(crate) mod messages;
 mod organ_flow;
 pub(crate) mod patient;
+mod perfused;
 pub(crate) mod perfusion;
+mod state;
 mod supply;
 
-pub use flow::CirculationState;
 pub use messages::{BleedingStarted, BleedingStopped, CirculationFailed};
 pub use patient::Patient;
 pub use perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply};
+pub use state::CirculationState;
 
 /// Lets blood flow through the vessels of organs with a [`Perfusion`]. Adds the [`SurgeryPlugin`], without which nothing
 /// would bleed.

@@ -1,12 +1,12 @@
 //! The blood of one organ, without an ECS: its networks, their gaps, and what its tissue gets.
 //!
-//! In: its trees at rest, a [`Perfusion`] and the ledgers of wounds. Out: bleeding over time,
-//! and the supply of segments and vertices.
+//! In: its trees at rest, settings of their flow and the ledgers of wounds. Out: bleeding over time, and the supply of
+//! segments and vertices.
 
-use crate::plugin::circulation::perfusion::Perfusion;
 use crate::synthesis::{
     haemodynamics::{
-        Bleeding, BloodVolume, Circulation, FlowError, Interruption, Network, Outlet, Supply, TissueSupply,
+        Bleeding, BloodVolume, Circulation, FlowError, FlowSettings, Interruption, Network, Outlet, Supply,
+        TissueSupply,
     },
     pace::Pace,
     tree::{BedLink, ByKind, NodeId, VesselKind, VesselTree},
@@ -18,6 +18,9 @@ use std::sync::Arc;
 
 /// The trees of an organ; `None` for a kind without vessels.
 pub(crate) type Trees = ByKind<Option<VesselTree>>;
+
+/// What the flow of each kind depends on; `None` for a kind that carries no blood.
+pub(crate) type Hydraulics = ByKind<Option<FlowSettings>>;
 
 /// An open end that the flow knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,14 +40,14 @@ struct Networks {
 }
 
 impl Networks {
-    async fn new(trees: &Trees, perfusion: &Perfusion, links: &[BedLink], pace: &Pace) -> Result<Self, FlowError> {
+    async fn new(trees: &Trees, hydraulics: &Hydraulics, links: &[BedLink], pace: &Pace) -> Result<Self, FlowError> {
         let mut networks = Self::default();
         for (kind, pace) in each_kind(&pace.part(0.0..0.8)) {
-            if let Some((tree, settings)) = trees[kind].as_ref().zip(perfusion.flow_settings(kind)) {
+            if let Some((tree, settings)) = trees[kind].as_ref().zip(hydraulics[kind].clone()) {
                 networks.apart[kind] = Some(Network::new_paced(tree, settings, &pace).await?);
             }
         }
-        if perfusion.bed.resistance.is_some() && !links.is_empty() {
+        if !links.is_empty() {
             networks.join(links, &pace.part(0.8..1.0)).await?;
         }
         Ok(networks)
@@ -115,14 +118,14 @@ pub(crate) struct OrganFlow {
 }
 
 impl OrganFlow {
-    /// The flow in the intact vessels.
+    /// The flow in the intact vessels. `links` join arteries and veins; none leave each to itself.
     pub(crate) async fn new(
         trees: Trees,
-        perfusion: &Perfusion,
+        hydraulics: &Hydraulics,
         links: &[BedLink],
         pace: &Pace,
     ) -> Result<Self, FlowError> {
-        Ok(Self { networks: Networks::new(&trees, perfusion, links, pace).await?, trees: Arc::new(trees) })
+        Ok(Self { networks: Networks::new(&trees, hydraulics, links, pace).await?, trees: Arc::new(trees) })
     }
 
     /// Lays the gaps of an earlier flow of the same vessels over this one, so that its holes stay as they are.

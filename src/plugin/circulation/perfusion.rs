@@ -1,6 +1,9 @@
 //! What makes blood flow in an organ's vessels, and what is known of it: settings, loss and supply.
 
-use crate::plugin::{circulation::flow::CirculationState, surgery::ledgers::Cuttable};
+use crate::plugin::{
+    circulation::{organ_flow::Hydraulics, state::CirculationState},
+    surgery::cuttable::Cuttable,
+};
 use crate::synthesis::{
     haemodynamics::{BedSettings, BleedingSettings, FlowSettings, RootPressure, ViscosityLaw},
     tree::{ByKind, VesselKind},
@@ -92,6 +95,11 @@ impl Perfusion {
         };
         let Self { scale, viscosity, ambient, discharge_coefficient, .. } = *self;
         Some(FlowSettings { scale, viscosity, root, bed, ambient, discharge_coefficient })
+    }
+
+    /// The same for all kinds.
+    pub(crate) fn hydraulics(&self) -> Hydraulics {
+        ByKind::from_fn(|kind| self.flow_settings(kind))
     }
 }
 

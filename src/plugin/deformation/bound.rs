@@ -5,8 +5,9 @@
 
 use crate::plugin::{
     job::{Job, Jobs},
+    lineage::Lineage,
     organ::mesh::MeshCopy,
-    vessels::{change_log::ChangeLog, lineage::Lineage, tree::Vessels},
+    vessels::{change_log::ChangeLog, tree::Vessels},
 };
 use crate::synthesis::{
     binding::{Binding, BindingError},

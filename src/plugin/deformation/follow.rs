@@ -8,8 +8,9 @@ use crate::plugin::{
     deformation::bound::{Bound, Motion, RestOrgan, VesselBinding},
     growth::{progress::GrowthProgress, state::GrowthState},
     job::Jobs,
+    lineage::Lineage,
     organ::mesh::{copy_mesh, vertex_positions},
-    vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels},
+    vessels::{relations::OrganVessels, tree::Vessels},
 };
 use crate::synthesis::mesh::TetMesh;
 use bevy::{

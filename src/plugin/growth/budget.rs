@@ -98,6 +98,42 @@ pub(crate) struct StepCost {
     pub(crate) publish: Duration,
 }
 
+/// What the steps of one growth have cost.
+#[derive(Debug, Default)]
+pub(crate) struct Costs {
+    steps: LastCosts,
+    /// Settling and publishing, for each step that was published.
+    publishing: LastCosts,
+    /// Settling, since the vessels were last published.
+    settling: Duration,
+    /// Steps that haven't been published.
+    unpublished: u32,
+}
+
+impl Costs {
+    pub(crate) fn note_step(&mut self, cost: Duration) {
+        self.steps.add(cost);
+        self.unpublished += 1;
+    }
+
+    pub(crate) fn note_settling(&mut self, cost: Duration) {
+        self.settling += cost;
+    }
+
+    /// Takes in what it cost to publish the steps done since the last time.
+    pub(crate) fn note_publishing(&mut self, cost: Duration) {
+        let cost = cost + std::mem::take(&mut self.settling);
+        if let Some(each) = cost.checked_div(std::mem::take(&mut self.unpublished)) {
+            self.publishing.add(each);
+        }
+    }
+
+    /// What the next step is expected to cost.
+    pub(crate) fn expected(&self) -> StepCost {
+        StepCost { step: self.steps.expected(), publish: self.publishing.expected() }
+    }
+}
+
 /// Lets those that take turns, in rising order, begin with the one after the `last` that had one.
 pub(crate) fn begin_after<T: Ord + Copy, C>(round: &mut [(T, C)], last: Option<T>) {
     let next = last.map_or(0, |last| round.partition_point(|&(organ, _)| organ <= last));

@@ -4,10 +4,10 @@
 
 use crate::plugin::{
     growth::{budget::GrowthFrame, progress::GrowthProgress, state::GrowthState, vasculature::Vasculature},
+    lineage::Lineage,
     vessels::{
         appearance::VesselAppearance,
         change_log::ChangeLog,
-        lineage::Lineage,
         relations::{OrganVessels, VesselsOf},
         tree::Vessels,
     },

@@ -21,6 +21,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     pace::{Pace, at_once},
+    preset::Preset,
     tissue::TissuePaint,
 };
 use bevy::{
@@ -189,7 +190,7 @@ impl OrganItem<'_, '_> {
         if self.wish.is_changed() || is_painted || self.state.follows_other_assets(assets) {
             let blank = TissuePaint::default();
             let paint = self.paint.as_ref().map_or(&blank, |paint| &paint.0);
-            self.state.follow(&self.wish, paint, assets);
+            self.state.follow(Preset::from(&*self.wish), self.wish.seed, paint, assets);
         }
     }
 
@@ -249,7 +250,7 @@ impl OrganItem<'_, '_> {
 
     /// Starts the growth on a tissue.
     pub(crate) fn start(&mut self, tissue: PaintedTissue) -> Result<Started, OrganGrowthError> {
-        for warning in self.state.start(tissue, &self.wish)? {
+        for warning in self.state.start(tissue, Preset::from(&*self.wish), self.wish.seed)? {
             warn!("{}: {warning}", self.entity);
         }
         let phase = if self.state.successor().is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing };

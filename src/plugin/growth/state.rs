@@ -4,20 +4,20 @@
 
 use crate::plugin::{
     growth::{
+        budget::Costs,
         followed::{Followed, Need, SourceAssets},
         messages::{GrowthAction, OrganGrowthError},
         progress::{GrowthControl, GrowthPhase},
-        steps::Costs,
         successor::Successor,
         tissue::{Painted, PaintedTissue},
-        vasculature::Vasculature,
     },
     job::Job,
+    lineage::Lineage,
     organ::{image::OrganImageError, mesh::OrganMeshError},
-    vessels::lineage::Lineage,
 };
 use crate::synthesis::{
     growth::{Growth, GrowthWarning},
+    preset::Preset,
     tissue::{Tissue, TissuePaint},
     tree::ByKind,
 };
@@ -106,16 +106,16 @@ impl GrowthState {
     }
 
     /// Compares what is wished for with what the growth follows, and demands what the difference needs.
-    pub(crate) fn follow(&mut self, wish: &Vasculature, paint: &TissuePaint, assets: SourceAssets) {
+    pub(crate) fn follow(&mut self, settings: Preset, seed: u64, paint: &TissuePaint, assets: SourceAssets) {
         let Some(followed) = &mut self.followed else {
-            self.followed = Some(Followed { wish: wish.clone(), paint: Arc::new(paint.clone()), assets });
+            self.followed = Some(Followed { settings, seed, paint: Arc::new(paint.clone()), assets });
             self.demand(Need::Tissue);
             return;
         };
-        let need = followed.need(wish, paint, assets);
+        let need = followed.need(&settings, seed, paint, assets);
         followed.assets = assets;
-        if followed.wish != *wish {
-            followed.wish.clone_from(wish);
+        if followed.settings != settings || followed.seed != seed {
+            (followed.settings, followed.seed) = (settings, seed);
             self.arrears = 0;
         }
         if *followed.paint != *paint {
@@ -263,20 +263,21 @@ impl GrowthState {
     pub(crate) fn start(
         &mut self,
         painted: PaintedTissue,
-        wish: &Vasculature,
+        settings: Preset,
+        seed: u64,
     ) -> Result<Vec<GrowthWarning>, OrganGrowthError> {
         self.need = Need::Nothing;
         self.preparation = None;
         self.successor = None;
         self.error = None;
         let tissue = Arc::clone(&painted.tissue);
-        let mut generator = wish.generator.clone();
-        if wish.fit {
+        let Preset { mut generator, roots, fit, .. } = settings;
+        if fit {
             generator = generator.fit(tissue.extent());
         }
-        let roots = wish.roots.clone().into();
+        let roots = roots.into();
         let warnings = if let (true, Some(drawn)) = (self.beside, &self.growth) {
-            let growth = generator.start(tissue, &roots, wish.seed)?;
+            let growth = generator.start(tissue, &roots, seed)?;
             let warnings = growth.warnings();
             self.successor = Some(Successor::of(&**drawn, painted, growth));
             warnings
@@ -285,8 +286,8 @@ impl GrowthState {
             self.costs = Costs::default();
             self.tissue = Some(painted);
             let growth = match self.growth.take() {
-                Some(growth) => generator.restart(growth, tissue, &roots, wish.seed),
-                None => generator.start(tissue, &roots, wish.seed),
+                Some(growth) => generator.restart(growth, tissue, &roots, seed),
+                None => generator.start(tissue, &roots, seed),
             }?;
             self.growth.insert(growth).warnings()
         };

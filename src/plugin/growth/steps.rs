@@ -1,31 +1,14 @@
 //! Steps of an organ's growth, what they cost, and what they changed.
 
 use crate::plugin::{
-    growth::{
-        budget::{LastCosts, StepCost},
-        progress::GrowthControl,
-        state::GrowthState,
-        successor::Successor,
-    },
-    vessels::lineage::Lineage,
+    growth::{budget::StepCost, progress::GrowthControl, state::GrowthState, successor::Successor},
+    lineage::Lineage,
 };
 use crate::synthesis::{
     growth::{GrownTree, Growth, TreeUpdate},
     tree::{ByKind, VesselKind},
 };
 use std::time::Duration;
-
-/// What steps have cost.
-#[derive(Debug, Default)]
-pub(crate) struct Costs {
-    steps: LastCosts,
-    /// Settling and publishing, for each step that was published.
-    publishing: LastCosts,
-    /// Settling, since the vessels were last published.
-    settling: Duration,
-    /// Steps that haven't been published.
-    unpublished: u32,
-}
 
 impl GrowthState {
     /// Whether there are steps to be done again at once.
@@ -112,18 +95,17 @@ impl GrowthState {
 
     /// Takes note of what settling cost.
     pub(crate) fn note_settling(&mut self, cost: Duration) {
-        self.costs.settling += cost;
+        self.costs.note_settling(cost);
     }
 
     /// Takes note of what a step cost.
     pub(crate) fn note_step(&mut self, cost: Duration) {
-        self.costs.steps.add(cost);
-        self.costs.unpublished += 1;
+        self.costs.note_step(cost);
     }
 
     /// What the next step is expected to cost.
     pub(crate) fn expected_cost(&self) -> StepCost {
-        StepCost { step: self.costs.steps.expected(), publish: self.costs.publishing.expected() }
+        self.costs.expected()
     }
 
     /// Does the steps again that were done before the organ was saved.
@@ -165,10 +147,7 @@ impl GrowthState {
 
     /// Forgets what has been published, at this cost.
     pub(crate) fn clear_news(&mut self, cost: Duration) {
-        let cost = cost + std::mem::take(&mut self.costs.settling);
-        if let Some(each) = cost.checked_div(std::mem::take(&mut self.costs.unpublished)) {
-            self.costs.publishing.add(each);
-        }
+        self.costs.note_publishing(cost);
         self.rebuild = ByKind::default();
         self.changed.values_mut().for_each(Vec::clear);
     }

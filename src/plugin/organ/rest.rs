@@ -1,8 +1,8 @@
 //! An organ's mesh at rest, kept while it is deformed.
 
 use crate::plugin::{
+    lineage::Lineage,
     organ::mesh::{MeshCopy, vertex_positions},
-    vessels::lineage::Lineage,
 };
 use bevy::{
     ecs::{component::Component, entity::Entity},

@@ -1,49 +1,29 @@
-//! What makes an organ's vessels cuttable, and the ledger of what was done to them.
+//! The ledgers of what was done to an organ's vessels.
 //!
 //! In: [`Cuttable`] on an organ. Out: [`VesselWounds`] on each of its vessel entities, which a regrowth clears.
 
-use crate::plugin::vessels::wounds::VesselWounds;
 use crate::plugin::{
     surgery::{
+        cuttable::Cuttable,
         cuttable_vessels::CuttableVessels,
         open_ends::{OpenEndEntities, despawn_children},
     },
-    vessels::{change_log::ChangeLog, index::VesselIndex, relations::OrganVessels, tree::Vessels},
+    vessels::{
+        change_log::ChangeLog, index::VesselIndex, relations::OrganVessels, tree::Vessels, wounds::VesselWounds,
+    },
 };
-use crate::synthesis::wound::Retraction;
 use bevy::{
     ecs::{
         change_detection::{DetectChangesMut, ResMut},
-        component::Component,
         entity::Entity,
         lifecycle::Remove,
         observer::On,
         query::{Changed, Or, With, Without},
-        reflect::ReflectComponent,
         system::{Commands, Query},
         world::EntityWorldMut,
     },
     log::warn,
-    reflect::{Reflect, std_traits::ReflectDefault},
 };
-
-/// Lets an organ's vessels be cut, clamped and cauterised: put it beside the organ's
-/// [`Vasculature`](crate::plugin::Vasculature), or on an organ with vessels of your own.
-///
-/// An organ without it pays nothing for it. Add a [`Perfusion`](crate::plugin::Perfusion), too, and open vessels bleed.
-/// Removing it makes the vessels whole again.
-///
-/// ```
-/// # use bevy_vessels::{plugin::{Cuttable, Vasculature}, synthesis::preset::PresetName};
-/// let organ = (Vasculature::new(PresetName::Colon), Cuttable::default());
-/// ```
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct Cuttable {
-    /// How far the ends of later cuts draw back, so that a gap is seen.
-    pub retraction: Retraction,
-}
 
 /// Cut: gives a ledger to the vessels of cuttable organs, and makes all ledgers those of the present vessels.
 pub(crate) fn attach_wounds(

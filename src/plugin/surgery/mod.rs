@@ -12,15 +12,16 @@ use bevy::{
     },
 };
 
-pub(crate) mod cuttable_vessels;
-pub(crate) mod ledgers;
+pub(crate) mod cuttable;
+mod cuttable_vessels;
+mod ledgers;
 pub(crate) mod messages;
 pub(crate) mod open_ends;
 mod operate;
 mod undo;
 
+pub use cuttable::Cuttable;
 pub use cuttable_vessels::{CuttableVessels, Stroke};
-pub use ledgers::Cuttable;
 pub use messages::{
     OperationError, OperationKind, StrokeId, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed,
     VesselSite,

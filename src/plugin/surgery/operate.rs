@@ -2,7 +2,7 @@
 
 use crate::plugin::{
     surgery::{
-        ledgers::Cuttable,
+        cuttable::Cuttable,
         messages::{OperationError, OperationKind, VesselAction, VesselCommand, VesselOperation, VesselSite},
         undo::UndoHistory,
     },

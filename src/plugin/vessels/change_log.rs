@@ -3,7 +3,7 @@
 //! In: nodes that a writer marks. Out: for each reader, the segments that changed since it last looked. A writer doesn't
 //! know its readers: each node has a stamp, the revision of its last change, and a reader remembers a revision.
 
-use crate::plugin::vessels::{changes::Changes, lineage::Lineage};
+use crate::plugin::{lineage::Lineage, vessels::changes::Changes};
 use bevy::ecs::component::Component;
 
 /// When each segment of a vessel entity last changed.

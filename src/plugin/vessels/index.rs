@@ -6,9 +6,9 @@
 
 use crate::plugin::{
     job::{Job, JobSettings, Jobs},
+    lineage::Lineage,
     vessels::{
         change_log::{ChangeCursor, ChangeLog},
-        lineage::Lineage,
         tree::Vessels,
     },
 };

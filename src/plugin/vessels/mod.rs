@@ -16,7 +16,6 @@ pub(crate) mod appearance;
 pub(crate) mod change_log;
 pub(crate) mod changes;
 pub(crate) mod index;
-pub(crate) mod lineage;
 pub(crate) mod pick;
 pub(crate) mod relations;
 mod saved;

@@ -1,6 +1,12 @@
 //! The tree of a vessel entity, kept up to date with a growth at the cost of what changed.
 
-use crate::plugin::vessels::{change_log::ChangeLog, lineage::Lineage, saved::clone_as_saved};
+use crate::plugin::{
+    lineage::Lineage,
+    vessels::{
+        change_log::ChangeLog,
+        saved::{GivenTree, SavedVessels},
+    },
+};
 use crate::synthesis::{
     binding::{Binding, BindingError},
     growth::GrownTree,
@@ -9,20 +15,27 @@ use crate::synthesis::{
 use bevy::{
     camera::{primitives::Aabb, visibility::Visibility},
     ecs::{
-        component::Component, lifecycle::HookContext, query::Changed, reflect::ReflectComponent, system::Query,
+        component::Component,
+        entity::{ComponentCloneCtx, SourceComponent},
+        lifecycle::HookContext,
+        query::Changed,
+        reflect::ReflectComponent,
+        system::Query,
         world::DeferredWorld,
     },
     math::Vec3,
     reflect::{Reflect, ReflectDeserialize, ReflectSerialize},
     transform::components::Transform,
 };
+use serde::{Deserialize, Serialize, Serializer};
 use std::borrow::Cow;
 
 /// The vessels of one kind of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
 /// off its surface where the settings say so.
 ///
 /// Scenes and clones of the entity keep a given tree, but not one that grew: that grows again from mesh, settings and seed.
-#[derive(Component, Clone, Debug, Reflect)]
+#[derive(Component, Clone, Debug, Reflect, Deserialize)]
+#[serde(from = "SavedVessels")]
 #[component(on_insert = mark_inserted, clone_behavior = Custom(clone_as_saved))]
 #[reflect(opaque, Component, Clone(Vessels::as_saved), Debug, PartialEq, Serialize, Deserialize)]
 #[require(ChangeLog, Transform, Visibility)]
@@ -128,19 +141,14 @@ impl Vessels {
         self.lineage
     }
 
-    /// Whether the tree is that of a growth, and not a given one.
-    pub(crate) fn is_grown(&self) -> bool {
-        self.is_grown
-    }
-
     /// Hash of the tree at rest, or of the one that was saved, until it has grown again.
     pub(crate) fn hash(&self) -> Option<u64> {
         if self.tree.is_empty() { self.saved_hash } else { Some(self.tree_at_rest().hash64()) }
     }
 
-    /// Takes note of the tree that they were saved with.
-    pub(crate) fn awaiting(self, saved_hash: Option<u64>) -> Self {
-        Self { saved_hash, ..self }
+    /// What a file would keep of them.
+    pub(crate) fn as_saved(&self) -> Self {
+        SavedVessels::from(self).into()
     }
 
     /// Whether the tree is the one that they were saved with.
@@ -304,6 +312,37 @@ impl Vessels {
 impl PartialEq for Vessels {
     fn eq(&self, other: &Self) -> bool {
         (self.kind, &self.tree, &self.birth_steps) == (other.kind, &other.tree, &other.birth_steps)
+    }
+}
+
+impl From<&Vessels> for SavedVessels {
+    fn from(vessels: &Vessels) -> Self {
+        let tree = || vessels.tree_at_rest().into_owned();
+        let given = (!vessels.is_grown).then(|| GivenTree { tree: tree(), birth_steps: vessels.birth_steps.clone() });
+        Self { kind: vessels.kind, hash: vessels.hash(), given }
+    }
+}
+
+impl From<SavedVessels> for Vessels {
+    fn from(saved: SavedVessels) -> Self {
+        let vessels = match &saved.given {
+            Some(GivenTree { tree, birth_steps }) => Self::from_tree(saved.kind, tree, birth_steps),
+            None => Self::new(saved.kind),
+        };
+        Self { saved_hash: saved.hash, ..vessels }
+    }
+}
+
+impl Serialize for Vessels {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SavedVessels::from(self).serialize(serializer)
+    }
+}
+
+/// Clones of entities have of their vessels what a file would keep: each has a growth of its own.
+fn clone_as_saved(source: &SourceComponent, context: &mut ComponentCloneCtx) {
+    if let Some(vessels) = source.read::<Vessels>() {
+        context.write_target_component(vessels.as_saved());
     }
 }
 

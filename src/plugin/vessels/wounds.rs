@@ -1,7 +1,10 @@
 //! The ledger of what was done to the vessels of a vessel entity.
 
 use crate::{
-    plugin::vessels::{change_log::ChangeLog, lineage::Lineage, tree::Vessels},
+    plugin::{
+        lineage::Lineage,
+        vessels::{change_log::ChangeLog, tree::Vessels},
+    },
     synthesis::{
         tree::Place,
         wound::{ClampId, WoundReport, Wounds},

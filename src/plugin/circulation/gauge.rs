@@ -1,0 +1,66 @@
+//! When the supply of an organ is measured, and with what.
+
+use crate::plugin::{
+    circulation::organ_flow::{Measured, SupplyGauge},
+    job::Job,
+};
+use crate::synthesis::haemodynamics::FlowError;
+
+/// A gauge, with what it has measured.
+pub(super) type Outcome = Result<(Box<SupplyGauge>, Measured), FlowError>;
+
+/// When the supply of an organ is measured, and with what.
+#[derive(Debug, Default)]
+pub(crate) struct Gauge {
+    /// `None` before the first measurement, and while the job has it.
+    gauge: Option<Box<SupplyGauge>>,
+    pub(super) job: Option<Job<Outcome>>,
+    /// Whether the organ's vessels have grown, so that there is something to measure.
+    pub(super) is_ready: bool,
+    /// Whether something was done to the vessels since it was measured.
+    is_due: bool,
+    /// Seconds since it was measured.
+    age: f64,
+    /// Whether blood was lost since.
+    bled: bool,
+    /// [`Perfusion::ischaemic_below`](crate::plugin::Perfusion::ischaemic_below) when it was measured.
+    ischaemic_below: f32,
+}
+
+impl Gauge {
+    /// Measures as soon as can be.
+    pub(crate) fn ready() -> Self {
+        Self { is_ready: true, is_due: true, ..Self::default() }
+    }
+
+    /// Measures after an action.
+    pub(crate) fn demand(&mut self) {
+        self.is_due = true;
+    }
+
+    /// Takes note of time that passed.
+    pub(crate) fn pass(&mut self, seconds: f64, bled: bool) {
+        self.age += seconds;
+        self.bled |= bled;
+    }
+
+    pub(super) fn is_to_begin(&self, interval: f32, ischaemic_below: f32) -> bool {
+        let is_old = self.bled && self.age >= f64::from(interval);
+        let is_other = self.ischaemic_below.to_bits() != ischaemic_below.to_bits();
+        self.is_ready && self.job.is_none() && (self.is_due || is_old || is_other)
+    }
+
+    /// Hands out what is measured with, and begins to count anew.
+    pub(super) fn begin(&mut self, ischaemic_below: f32) -> Option<Box<SupplyGauge>> {
+        let gauge = self.gauge.take();
+        *self = Self { is_ready: true, ischaemic_below, ..Self::default() };
+        gauge
+    }
+
+    /// What has been measured, and keeps what it was measured with.
+    pub(super) fn accept(&mut self, outcome: Outcome) -> Result<Measured, FlowError> {
+        let (gauge, measured) = outcome?;
+        self.gauge = Some(gauge);
+        Ok(measured)
+    }
+}
