@@ -1,8 +1,7 @@
-//! Circulate: the blood of organs with a [`Perfusion`], made to flow.
+//! Circulate: makes the blood of organs with a [`Perfusion`] flow.
 //!
-//! In: [`Vessels`] at rest and the organ's settings. Out: the flow in [`CirculationState`]. Networks are made in
-//! jobs. Given the same vessels, actions and time steps, the same is
-//! lost to the last bit, as long as no network is on its way.
+//! In: [`Vessels`] at rest and the organ's settings. Out: the flow in [`CirculationState`]. Jobs make the networks. The
+//! same vessels, actions and time steps give the same blood loss to the last bit, while no network is being made.
 
 use crate::plugin::{
     announcer::Announcer,
@@ -45,15 +44,15 @@ use serde::{Deserialize, Serialize};
 
 /// The flow in an organ's vessels. The plugin drives it.
 ///
-/// Scenes and clones of the organ keep how far its open ends have clotted. All else is made anew.
+/// Scenes and clones of the organ keep how far its open ends have clotted. Everything else is made again.
 #[derive(Component, Debug, Default, Reflect, Serialize, Deserialize)]
 #[reflect(opaque, Component, Default, Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CirculationState {
-    /// The vessels that the flow is of, or will be when it is made.
+    /// The vessels of the present or coming flow.
     #[serde(skip)]
     made_for: Option<MadeFor>,
-    /// How they are perfused, paused or not.
+    /// The perfusion of these vessels, whose pause is ignored.
     #[serde(skip)]
     made_with: Option<Perfusion>,
     #[serde(skip)]
@@ -61,20 +60,20 @@ pub struct CirculationState {
     #[serde(skip)]
     pub(crate) flow: Option<OrganFlow>,
     pub(crate) bleeding: ByKind<Bleeding>,
-    /// Open ends in the order of the networks'.
+    /// Open ends, in the order of the networks.
     #[serde(skip)]
     pub(crate) ends: ByKind<Vec<FlowingEnd>>,
-    /// Whether the gaps have to be laid anew.
+    /// Whether the gaps have to be laid again.
     #[serde(skip)]
     pub(crate) is_unlaid: bool,
-    /// How the supply is measured, once the vessels have grown.
+    /// Measures the supply, once the vessels have grown.
     #[serde(skip)]
     pub(crate) gauge: Gauge,
     #[serde(skip)]
     error: Option<FlowError>,
 }
 
-/// Which vessels a flow is of.
+/// The vessels of a flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct MadeFor {
     lineages: ByKind<Lineage>,
@@ -82,7 +81,7 @@ struct MadeFor {
     is_grown: bool,
 }
 
-/// What scenes keep.
+/// A clone keeps what a scene keeps.
 impl Clone for CirculationState {
     fn clone(&self) -> Self {
         Self { bleeding: self.bleeding.clone().map(|_, bleeding| bleeding.resumed()), ..Self::default() }
@@ -90,19 +89,19 @@ impl Clone for CirculationState {
 }
 
 impl MadeFor {
-    /// Whether some of its vessels have given way to others.
+    /// Whether some of its vessels have been replaced.
     fn is_replaced_by(&self, now: &Self) -> bool {
         VesselKind::ALL.into_iter().any(|kind| self.nodes[kind] > 0 && self.lineages[kind] != now.lineages[kind])
     }
 }
 
 impl CirculationState {
-    /// Whether blood flows: the vessels are there, and their network has been made.
+    /// Whether blood flows: the vessels exist, and their network has been made.
     pub fn flows(&self) -> bool {
         self.flow.is_some()
     }
 
-    /// How each open end of a kind of vessels bleeds, as of the last frame.
+    /// The bleeding of each open end of a kind of vessels, as of the last frame.
     pub fn bleeding(&self, kind: VesselKind) -> &Bleeding {
         &self.bleeding[kind]
     }
@@ -116,7 +115,7 @@ impl CirculationState {
         self.flow.as_ref()
     }
 
-    /// Takes over a new flow, with what the old one has laid.
+    /// Takes over a new flow, with the gaps of the old one.
     fn take(&mut self, mut flow: OrganFlow, is_grown: bool) -> Result<(), FlowError> {
         if let Some(before) = &self.flow {
             flow.keep_gaps_of(before)?;
@@ -128,7 +127,7 @@ impl CirculationState {
     }
 }
 
-/// A vessel entity, with all that flow reads.
+/// A vessel entity, with all that the flow reads.
 #[derive(QueryData)]
 pub(crate) struct Perfused {
     pub(crate) entity: Entity,
@@ -137,7 +136,7 @@ pub(crate) struct Perfused {
     pub(crate) entities: Option<&'static OpenEndEntities>,
 }
 
-/// An organ with blood, and what its vessels grow from.
+/// An organ with blood, and its growth.
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(crate) struct PerfusedOrgan {
@@ -150,7 +149,7 @@ pub(crate) struct PerfusedOrgan {
     pub(crate) loss: &'static mut BloodLoss,
 }
 
-/// Gives a patient to organs that find none, and their vessels what is to be written on them.
+/// Gives a patient to organs that find none, and the written components to their vessels.
 pub(crate) fn prepare_organs(
     mut commands: Commands,
     organs: Query<(Entity, Option<&OrganVessels>), With<Perfusion>>,
@@ -169,7 +168,7 @@ pub(crate) fn prepare_organs(
     }
 }
 
-/// Makes the flow of vessels that are new, have grown, or are to be perfused otherwise.
+/// Makes the flow of vessels that are new, have grown, or have a changed perfusion.
 pub(crate) fn make_flow(
     mut organs: Query<PerfusedOrgan>,
     vessels: Query<Perfused>,
@@ -203,7 +202,7 @@ impl PerfusedOrganItem<'_, '_> {
         made_for
     }
 
-    /// Whether another flow is to be made than there is.
+    /// Whether a new flow has to be made.
     fn takes_note_of(&mut self, made_for: MadeFor) -> bool {
         let mut is_new = self.state.made_for != Some(made_for);
         if self.perfusion.is_changed() {
@@ -214,7 +213,7 @@ impl PerfusedOrganItem<'_, '_> {
         is_new
     }
 
-    /// Begins to make a flow. Large trees wait until they have grown.
+    /// Starts making a flow. Large trees wait until they have grown.
     fn begin(&mut self, made_for: MadeFor, vessels: &Query<Perfused>, messages: &mut BleedingMessages, jobs: &Jobs) {
         let is_other = self.state.made_for.is_some_and(|before| before.is_replaced_by(&made_for));
         self.state.made_for = Some(made_for);
@@ -250,7 +249,7 @@ impl PerfusedOrganItem<'_, '_> {
         trees
     }
 
-    /// Nothing is left of the blood in other vessels, whose ends are gone.
+    /// Drops the flow of replaced vessels, whose ends no longer exist.
     fn forget(&mut self, vessels: &Query<Perfused>, messages: &mut BleedingMessages) {
         for found in each_kind(self.entities(), vessels) {
             let kind = found.vessels.kind();
@@ -274,7 +273,7 @@ impl PerfusedOrganItem<'_, '_> {
         self.loss.set_if_neq(BloodLoss::default());
     }
 
-    /// Other settings of the bleeding begin the clotting anew.
+    /// Restarts the clotting if the bleeding settings changed.
     fn follow_bleeding_settings(&mut self) -> Result<(), FlowError> {
         let settings = self.perfusion.bleeding;
         for bleeding in self.state.bleeding.values_mut() {
@@ -292,7 +291,7 @@ impl PerfusedOrganItem<'_, '_> {
         }
     }
 
-    /// The blood stands still until something changes.
+    /// Stops the blood until something changes.
     pub(crate) fn fail(&mut self, error: FlowError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
         warn!("{organ}: its blood stands still: {error}");
@@ -305,7 +304,7 @@ impl PerfusedOrganItem<'_, '_> {
     }
 }
 
-/// The vessel entity of each kind; of several of one kind, the first.
+/// The vessel entity of each kind; if several have one kind, the first.
 pub(crate) fn each_kind<'a>(
     entities: &'a [Entity],
     vessels: &'a Query<Perfused>,
@@ -314,7 +313,7 @@ pub(crate) fn each_kind<'a>(
     vessels.iter_many(entities).filter(move |found| !std::mem::replace(&mut seen[found.vessels.kind()], true))
 }
 
-/// An organ that is to have no blood any more.
+/// Removes the flow of an organ that lost its [`Perfusion`].
 pub(crate) fn remove_circulation(
     removed: On<Remove, Perfusion>,
     organs: Query<&OrganVessels>,
@@ -336,7 +335,7 @@ pub(crate) fn remove_circulation(
     });
 }
 
-/// Vessels whose ledger is gone have no gaps: those that were laid are taken off.
+/// Takes the gaps off vessels whose ledger was removed.
 pub(crate) fn lay_again(
     removed: On<Remove, VesselWounds>,
     vessels: Query<&VesselsOf>,

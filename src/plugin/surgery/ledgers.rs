@@ -1,4 +1,4 @@
-//! What makes an organ's vessels cuttable, and the ledger of what was done to them.
+//! Makes an organ's vessels cuttable, and gives them a ledger of what was done to them.
 //!
 //! In: [`Cuttable`] on an organ. Out: [`VesselWounds`] on each of its vessel entities, which a regrowth clears.
 
@@ -27,10 +27,10 @@ use bevy::{
     reflect::{Reflect, std_traits::ReflectDefault},
 };
 
-/// Lets an organ's vessels be cut, clamped and cauterised: put it beside the organ's
+/// Lets an organ's vessels be cut, clamped and cauterised. Put it beside the organ's
 /// [`Vasculature`](crate::plugin::Vasculature), or on an organ with vessels of your own.
 ///
-/// An organ without it pays nothing for it. Add a [`Perfusion`](crate::plugin::Perfusion), too, and open vessels bleed.
+/// An organ without it has no cost from it. With a [`Perfusion`](crate::plugin::Perfusion), too, open vessels bleed.
 /// Removing it makes the vessels whole again.
 ///
 /// ```
@@ -41,11 +41,11 @@ use bevy::{
 #[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Cuttable {
-    /// How far the ends of later cuts draw back, so that a gap is seen.
+    /// How far the ends of later cuts retract, so that a gap is visible.
     pub retraction: Retraction,
 }
 
-/// Cut: gives a ledger to the vessels of cuttable organs, and makes all ledgers those of the present vessels.
+/// Cut: gives a ledger to the vessels of cuttable organs.
 pub(crate) fn attach_wounds(
     mut commands: Commands,
     organs: Query<&OrganVessels, With<Cuttable>>,
@@ -59,7 +59,7 @@ pub(crate) fn attach_wounds(
     }
 }
 
-/// Cut: vessels that grew anew have no wounds, but for those that they were saved with.
+/// Cut: clears the wounds of vessels that grew again, except those that they were saved with.
 pub(crate) fn clear_outdated(
     mut vessels: Query<(Entity, &Vessels, &mut VesselWounds)>,
     mut door: ResMut<CuttableVessels>,
@@ -86,7 +86,7 @@ pub(crate) fn clear_outdated(
     }
 }
 
-/// Cut: ledgers follow changed settings.
+/// Cut: applies changed settings to ledgers.
 pub(crate) fn follow_settings(
     organs: Query<(Entity, &Cuttable, &OrganVessels), Or<(Changed<Cuttable>, Changed<OrganVessels>)>>,
     mut wounds: Query<&mut VesselWounds>,
@@ -103,7 +103,7 @@ pub(crate) fn follow_settings(
     }
 }
 
-/// Vessels that are no longer cuttable are whole.
+/// Makes vessels whole when they cease to be cuttable.
 pub(crate) fn remove_wounds(
     removed: On<Remove, Cuttable>,
     organs: Query<&OrganVessels>,
@@ -120,7 +120,7 @@ pub(crate) fn remove_wounds(
     }
 }
 
-/// A ledger that is gone can't undo anything.
+/// Removes a removed ledger from the undo history.
 pub(crate) fn forget_ledger(removed: On<Remove, VesselWounds>, mut door: ResMut<CuttableVessels>) {
     door.forget(removed.entity);
 }

@@ -1,11 +1,11 @@
-//! What is kept of vessels that are saved or cloned: all of a given tree, and of one that grew what tells it from others.
+//! The saved form of vessels, for files and clones: a given tree as a whole, and a hash of one that grew.
 
 use crate::plugin::vessels::tree::Vessels;
 use crate::synthesis::tree::{VesselKind, VesselTree};
 use bevy::ecs::entity::{ComponentCloneCtx, SourceComponent};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// [`Vessels`] as they are written to a file.
+/// [`Vessels`] in a file.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Vessels", deny_unknown_fields)]
 struct SavedVessels {
@@ -46,7 +46,7 @@ impl<'de> Deserialize<'de> for Vessels {
 }
 
 impl Vessels {
-    /// What a file would keep of them.
+    /// The vessels with only what a file keeps.
     pub(crate) fn as_saved(&self) -> Self {
         let saved = if self.is_grown() {
             Self::new(self.kind())
@@ -57,7 +57,7 @@ impl Vessels {
     }
 }
 
-/// Clones of entities have of their vessels what a file would keep: each has a growth of its own.
+/// Clones vessels with only what a file keeps, since each clone has a growth of its own.
 pub(super) fn clone_as_saved(source: &SourceComponent, context: &mut ComponentCloneCtx) {
     if let Some(vessels) = source.read::<Vessels>() {
         context.write_target_component(vessels.as_saved());
