@@ -1,19 +1,19 @@
-//! Levels of detail: which mesh a chunk of segments draws, by the size of its thickest segment in the picture.
+//! Levels of detail: the mesh that a chunk of segments draws, chosen by the size of its thickest segment in the
+//! picture.
 //!
 //! In: the chunks' boxes and thickest radii, and the cameras. Out: each chunk's mesh.
 //!
 //! Nothing pops, by construction. As a segment gets small, the vertex stage slides the corners of its cross-section to
-//! those of the next coarser polygon, and from there to those of the one after it, each vertex by the size of its own end;
-//! a chunk goes to the coarser mesh when all its vertices have slid to it, or beyond as those of its thinnest segments
-//! have, so that both meshes are the same surface. Below a pixel, segments drop out one by one,
-//! and those that are kept are widened, so that vessels cover the same area (Cook, Halstead, Planck & Ryu, "Stochastic
-//! simplification of aggregate detail", 2007); a chunk leaves those out of its mesh whose width has become zero.
-//! Which slots drop first is decided by multiples of the golden ratio, which spread evenly over any run of slots, and over
-//! every second one.
+//! those of the next coarser polygon, and from there to those of the one after it, each vertex by the size of its own
+//! end. A chunk switches to the coarser mesh when all its vertices have slid at least that far, so that both meshes are
+//! the same surface. Below a pixel, segments drop out one by one, and the others are widened, so that vessels cover the
+//! same area (Cook, Halstead, Planck & Ryu, "Stochastic simplification of aggregate detail", 2007). A chunk's mesh
+//! leaves out segments whose width has become zero. Multiples of the golden ratio decide which slots drop first: they
+//! spread evenly over any run of slots, and over every second one.
 //!
-//! A chunk is as fine as the most demanding camera wants it. Prepasses and shadow maps draw the same meshes. In a shadow map
-//! vertices slide by their size there: one much finer than the picture may show a change of level as a slight change of
-//! shade on vessels of a few pixels, within the [tolerance](super::SegmentRenderPlugin::tolerance).
+//! A chunk is as fine as the most demanding camera needs. Prepasses and shadow maps draw the same meshes. In a shadow
+//! map vertices slide by their size there: one much finer than the picture may show a change of level as slightly
+//! changed shading on vessels of a few pixels, within the [tolerance](super::SegmentRenderPlugin::tolerance).
 
 use super::{
     segments::SegmentChunk,
@@ -27,17 +27,17 @@ use bevy::{
 };
 use std::f32::consts::PI;
 
-/// The least number of slots in a mesh: what little vessels draw.
+/// The least number of slots in a mesh, for small vessel trees.
 pub(super) const FEWEST_SLOTS: usize = 256;
-/// The most slots in a mesh: fewer chunks for the CPU, none of them too large for a mesh to be made in a frame.
+/// The most slots in a mesh: few chunks for the CPU, with meshes small enough to be made in a frame.
 const MOST_SLOTS: usize = 4096;
-/// Vertices that a mesh of the finest level may have, but for very round segments, of which [`FEWEST_SLOTS`] have more.
+/// Most vertices in a mesh of the finest level, unless [`FEWEST_SLOTS`] very round segments need more.
 const MOST_VERTICES: usize = 1 << 17;
 /// Sides of the levels below the finest.
 const COARSER_SIDES: [u32; 3] = [8, 5, 3];
 /// Strides of the levels that leave slots out.
 const STRIDES: [usize; 6] = [2, 4, 8, 16, 32, 64];
-/// Share by which a slot's threshold may be passed before it is gone: it gets thinner on the way. `segments.wgsl` has it too.
+/// Share beyond its threshold at which a slot is gone: it gets thinner up to there. Also in `segments.wgsl`.
 const FADE: f32 = 0.25;
 /// A chunk becomes coarser a little later than it could, so that one at the limit doesn't change all the time.
 const HYSTERESIS: f32 = 0.9;
@@ -66,7 +66,7 @@ impl Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Level {
     pub(super) shape: Shape,
-    /// What the level's vertices slide to, one after the other.
+    /// The shapes to which the level's vertices slide, one after the other.
     pub(super) goals: Vec<Goal>,
     /// One of about this many slots is in the mesh.
     pub(super) stride: usize,
@@ -90,18 +90,18 @@ impl Level {
         u64::from(threshold(slot)) * (self.stride as u64) < 1 << 32
     }
 
-    /// The largest share of all segments that may be kept, so that those not in the mesh aren't missed.
+    /// The largest share of all segments that may be kept, so that no segment missing in the mesh should be drawn.
     pub(super) fn most_kept(&self) -> f32 {
         if self.stride == 1 { 1.0 } else { 1.0 / (self.stride as f32 * (1.0 + FADE)) }
     }
 }
 
-/// The share of segments below which a slot drops out, times 2³². `segments.wgsl` computes the same.
+/// The share of kept segments below which a slot drops out, times 2³². `segments.wgsl` computes the same.
 fn threshold(slot: usize) -> u32 {
     (slot as u32).wrapping_mul(0x9e37_79b9)
 }
 
-/// What the levels follow from: the settings of the plugin, checked.
+/// The checked settings of the plugin, which determine the levels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Detail {
     /// The finest shape.
@@ -139,7 +139,7 @@ impl Detail {
         levels
     }
 
-    /// Radius in pixels from which on all slots but one of `stride` have width zero.
+    /// Radius in pixels below which all slots but one of `stride` have width zero.
     fn dropped_below(&self, stride: usize) -> f32 {
         0.5 * self.least_width / (stride as f32 * (1.0 + FADE))
     }
@@ -151,7 +151,7 @@ impl Detail {
     }
 }
 
-/// The meshes that chunks share, made when they are needed first.
+/// The meshes that chunks share, made when first needed.
 #[derive(Resource, Debug)]
 pub(super) struct ChunkMeshes {
     levels: Vec<Level>,
@@ -169,7 +169,7 @@ impl ChunkMeshes {
         self.slots
     }
 
-    /// The level at which a chunk is drawn that was at `level` before, when its thickest radius has so many pixels.
+    /// The level of a chunk that was at `level` before and whose thickest radius has so many pixels.
     fn level(&self, level: usize, radius: f32) -> usize {
         let coarsest = |radius: f32| self.levels.iter().rposition(|level| radius < level.drawn_below).unwrap_or(0);
         coarsest(radius).min(coarsest(radius / HYSTERESIS).max(level))
@@ -182,7 +182,7 @@ impl ChunkMeshes {
     }
 }
 
-/// Gives every chunk the mesh that its size in the picture asks for.
+/// Gives every chunk the mesh for its size in the picture.
 pub(super) fn choose_detail(
     cameras: Query<(&Camera, &GlobalTransform), With<Camera3d>>,
     mut chunks: Query<(&mut SegmentChunk, &mut Mesh3d, &Aabb, &GlobalTransform)>,
@@ -201,7 +201,7 @@ pub(super) fn choose_detail(
     }
 }
 
-/// What decides the size of things in a camera's picture.
+/// The part of a camera that decides the size of things in its picture.
 struct Eye {
     /// Dot product with a point in the world: its depth, by which sizes are divided. 1 without perspective.
     depth: Vec4,
@@ -218,7 +218,7 @@ impl Eye {
         Some(Self { depth, focal_length: 0.5 * height * clip_from_view.y_axis.y.abs() })
     }
 
-    /// The most pixels that a unit length may have, anywhere in a box. Infinite where it reaches behind the camera.
+    /// The most pixels that a unit length may have, anywhere in a box. Huge if the box reaches behind the camera.
     fn pixels_per_length(&self, place: &Affine3A, aabb: &Aabb) -> f32 {
         let direction = Vec3A::from(self.depth.truncate());
         let across = place.matrix3.transpose() * direction;
@@ -228,7 +228,7 @@ impl Eye {
     }
 }
 
-/// The greatest length that a unit length along an axis gets. `segments.wgsl` computes the same.
+/// The greatest scale along an axis. `segments.wgsl` computes the same.
 fn largest_scale(place: &Affine3A) -> f32 {
     let axes = place.matrix3;
     axes.x_axis.length_squared().max(axes.y_axis.length_squared()).max(axes.z_axis.length_squared()).sqrt()
@@ -251,7 +251,8 @@ mod tests {
                     assert_eq!(pair[0].goals[0], Goal { shape: pair[1].shape, slid_below: pair[1].drawn_below });
                     assert_eq!(pair[0].goals[1..], pair[1].goals, "from there on they go together");
                 }
-                // vertices set out at twice the size at which they arrive: not before they have arrived at the goal before
+                // vertices set out at twice the size at which they arrive, and not before they reached the previous
+                // goal
                 assert!(pair[0].goals.windows(2).all(|goals| 2.0 * goals[1].slid_below <= goals[0].slid_below));
                 let [fine, coarse] = [0, 1].map(|i| pair[i].shape.vertices() * 1000 / pair[i].stride);
                 assert!(coarse < fine, "{pair:?}");

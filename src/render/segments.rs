@@ -27,7 +27,7 @@ use bevy::{
     render::storage::ShaderBuffer,
 };
 
-/// What is drawn of a vessel entity: its buffer of segments, its material and its chunks.
+/// The drawn form of a vessel entity: its buffer of segments, its material and its chunks.
 ///
 /// Added to entities with [`Vessels`] and removed with them.
 #[derive(Component, Debug)]
@@ -36,21 +36,21 @@ pub struct SegmentBuffer {
     material: Handle<SegmentMaterial>,
     /// The changes that have been drawn.
     drawn: ChangeCursor,
-    /// Segments that the buffer has room for.
+    /// Node slots in the buffer.
     capacity: usize,
-    /// Slots that may hold something else than hidden segments.
+    /// Slots that may hold segments that are not hidden.
     written: usize,
     /// Chunk entities, in the order of their slots.
     chunks: Vec<Entity>,
-    /// What is in each chunk.
+    /// The contents of each chunk.
     contents: Vec<ChunkContents>,
     colors: SegmentColors,
     /// The appearance that `colors` follow, `None` at first.
     look: Option<Look>,
     warned_of_limit: bool,
-    /// What severed segments show.
+    /// The remaining pieces of severed segments.
     pub(super) stumps: Stumps,
-    /// Slots that the buffer has for stumps, behind those of the nodes.
+    /// Slots for stumps in the buffer, behind those of the nodes.
     room: usize,
 }
 
@@ -62,8 +62,9 @@ impl SegmentBuffer {
 
     /// The buffer that holds this vessel entity's segments, one
     /// [`SegmentInstance`](crate::synthesis::instances::SegmentInstance) per node, for materials and compute shaders of
-    /// your own. From [`capacity`](Self::capacity) on follow the pieces of severed segments beside the first of each, in no
-    /// order. It is on the GPU only, and moves when it grows: ask again after the handle's asset was modified.
+    /// your own. From [`capacity`](Self::capacity) on it holds the further pieces of severed segments, after the first
+    /// of each, in no order. It is on the GPU only, and moves when it grows: get it again after the handle's asset was
+    /// modified.
     pub fn buffer(&self) -> &Handle<ShaderBuffer> {
         &self.buffer
     }
@@ -78,13 +79,13 @@ impl SegmentBuffer {
         self.stumps.chunks()
     }
 
-    /// Nodes' segments that fit before the buffer has to grow.
+    /// Number of nodes whose segments fit before the buffer has to grow.
     pub fn capacity(&self) -> usize {
         self.capacity
     }
 }
 
-/// An entity that draws one chunk of segments. For reading: its mesh follows its size in the picture.
+/// An entity that draws one chunk of segments. Read-only: its mesh follows its size in the picture.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(Component, Clone, Debug)]
 pub struct SegmentChunk {
@@ -94,7 +95,7 @@ pub struct SegmentChunk {
     pub(super) slots: usize,
     /// Its level of detail.
     pub(super) level: usize,
-    /// Level and slots of the mesh that it has.
+    /// Level and slots of its present mesh.
     pub(super) drawn: (usize, usize),
 }
 
@@ -105,7 +106,7 @@ impl SegmentChunk {
     }
 }
 
-/// What a chunk's box and thickness follow from.
+/// The extent of a chunk's segments: gives its box and thickness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct ChunkContents {
     bounds: Option<Aabb3d>,
@@ -113,7 +114,7 @@ pub(super) struct ChunkContents {
 }
 
 impl ChunkContents {
-    /// Takes in segments. While vessels grow, what they were before lies within what they are now.
+    /// Adds segments. While vessels grow, their old shapes lie within the new ones.
     pub(super) fn add<'a>(&mut self, segments: impl IntoIterator<Item = &'a SegmentInstance>) {
         for segment in segments.into_iter().filter(|segment| segment.is_visible()) {
             let own = segment.bounds();
@@ -123,7 +124,7 @@ impl ChunkContents {
     }
 }
 
-/// What decides the colours.
+/// The inputs of the colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Look {
     Uniform([f32; 3]),
@@ -163,7 +164,7 @@ pub(super) fn attach_buffers(
     mut materials: ResMut<Assets<SegmentMaterial>>,
 ) {
     for (entity, vessels, children) in &new {
-        // Those that came with a scene or a clone draw nothing.
+        // Chunks that came with a scene or a clone draw nothing.
         for &stray in children.into_iter().flatten().filter(|&&child| chunks.contains(child)) {
             commands.entity(stray).try_despawn();
         }
@@ -191,7 +192,7 @@ pub(super) fn attach_buffers(
     }
 }
 
-/// Removes what was drawn of an entity that lost its vessels but lives on.
+/// Removes the chunks of an entity that lost its vessels but still exists.
 pub(super) fn detach_buffer(removed: On<Remove, Vessels>, mut commands: Commands, buffers: Query<&SegmentBuffer>) {
     if let Ok(buffer) = buffers.get(removed.entity) {
         for &chunk in buffer.chunks.iter().chain(buffer.stump_chunks()) {
@@ -227,7 +228,7 @@ pub(super) struct DrawnVessels {
     segments: &'static mut SegmentBuffer,
 }
 
-/// Brings buffers, boxes and chunks up to date with trees and colours that changed.
+/// Updates buffers, boxes and chunks from changed trees and colours.
 pub(super) fn update_segments(
     mut drawn: Query<DrawnVessels>,
     appearances: Query<Ref<VesselAppearance>>,
@@ -261,12 +262,12 @@ pub(super) fn update_segments(
 }
 
 impl SegmentBuffer {
-    /// Whether colours tell the supply.
+    /// Whether colours show the supply.
     fn follows_supply(&self) -> bool {
         matches!(self.look, Some(Look::Supply(_)))
     }
 
-    /// Adopts look and supply, and adds the segments that have another colour now.
+    /// Takes over look and supply, and adds the segments whose colour changed.
     fn adopt(&mut self, look: Look, vessels: &Vessels, supply: &[f32], changes: &mut Changes) {
         let (tree, births) = (vessels.tree(), vessels.birth_steps());
         if self.look != Some(look) {
@@ -285,7 +286,7 @@ impl SegmentBuffer {
 }
 
 impl SegmentStore<'_, '_> {
-    /// How many of `len` nodes can be drawn beside the stumps; says so once when those are not all.
+    /// Number of `len` nodes that can be drawn beside the stumps; warns once if not all can.
     fn drawable(&self, entity: Entity, len: usize, segments: &mut SegmentBuffer) -> usize {
         let stumps = segments.stumps.room();
         let most = self.limits.max_segments().saturating_sub(stumps);
@@ -309,7 +310,7 @@ impl SegmentStore<'_, '_> {
             if let Some(mut buffer) = self.buffers.get_mut(&segments.buffer) {
                 buffer.resize_in_place(((segments.capacity + room) * SegmentInstance::SIZE) as u64);
             }
-            // a mutable look at the material makes its bind group anew, with the larger buffer
+            // mutable access to the material makes its bind group again, with the larger buffer
             if let Some(mut material) = self.materials.get_mut(&segments.material) {
                 material.extension.segments = segments.buffer.clone();
             }
@@ -322,7 +323,7 @@ impl SegmentStore<'_, '_> {
         }
     }
 
-    /// Queues the segments that changed, and takes them into their chunks.
+    /// Queues the segments that changed, and adds them to their chunks.
     fn write(&mut self, vessels: &Vessels, changes: &Changes, segments: &mut SegmentBuffer, len: usize) {
         let slots = self.templates.slots();
         if changes.is_all() {
@@ -341,13 +342,13 @@ impl SegmentStore<'_, '_> {
             segments.stumps.replace(nodes, out);
             contents.add(&*out);
         }
-        // what a longer tree left behind
+        // slots left over from a longer tree
         write.extend(left_behind);
         segments.written = len;
         self.writes.push(write);
     }
 
-    /// Gives chunks that changed their boxes, and spawns those that are missing.
+    /// Updates the boxes of changed chunks, and spawns missing chunks.
     fn fit_chunks(&mut self, entity: Entity, segments: &mut SegmentBuffer, len: usize) {
         let full = self.templates.slots();
         for chunk in 0..segments.contents.len() {
@@ -359,7 +360,7 @@ impl SegmentStore<'_, '_> {
         }
     }
 
-    /// Gives a chunk its box. Spawns one that is not known yet, from its first slot, and returns it.
+    /// Gives a chunk its box. A chunk that is not known yet is spawned, from its first slot, and returned.
     pub(super) fn fit_chunk(
         &mut self,
         (entity, segments): (Entity, &SegmentBuffer),

@@ -294,7 +294,7 @@ impl PerfusedOrganItem<'_, '_> {
     /// Stops the blood until something changes.
     pub(crate) fn fail(&mut self, error: FlowError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
-        warn!("{organ}: its blood stands still: {error}");
+        warn!("{organ}: its blood does not flow: {error}");
         self.state.job = None;
         self.state.flow = None;
         self.state.ends.values_mut().for_each(Vec::clear);

@@ -58,7 +58,7 @@ fn grow_organ_now(world: &mut World, organ: Entity) -> Result<(), RegisteredSyst
 /// Prepares an organ synchronously, and does all its steps.
 fn finish_organ(In(entity): In<Entity>, assets: OrganAssets, mut organs: Query<Organ>, mut messages: StartMessages) {
     let Ok(mut organ) = organs.get_mut(entity) else {
-        warn!("{entity}: grow_now is for entities with a Vasculature");
+        warn!("{entity}: grow_now needs an entity with a Vasculature");
         return;
     };
     organ.follow();

@@ -73,7 +73,7 @@ pub(crate) fn clear_outdated(
                 wounds.resume(vessels);
                 continue;
             }
-            warn!("{entity}: its wounds are dropped: these are other vessels than those that it was saved with");
+            warn!("{entity}: its wounds are dropped: its vessels differ from those that it was saved with");
         }
         if !wounds.is_of(vessels) {
             door.bypass_change_detection().forget(entity);
@@ -96,7 +96,7 @@ pub(crate) fn follow_settings(
         while let Some(mut wounds) = wounds.fetch_next() {
             let ledger = wounds.bypass_change_detection().ledger_mut();
             if let Err(error) = ledger.set_retraction(cuttable.retraction) {
-                warn!("{organ}: ends go on drawing back as before: {error}");
+                warn!("{organ}: the retraction of cut ends stays as before: {error}");
                 break;
             }
         }

@@ -215,7 +215,7 @@ pub enum OperationError {
         reach: f32,
     },
     /// The entity is not an organ with vessels that can be cut.
-    #[error("{organ} is no organ that can be cut; give it a Cuttable, and wait until its vessels have begun to grow")]
+    #[error("{organ} is not an organ that can be cut; give it a Cuttable, and wait until its vessels begin to grow")]
     NotCuttable {
         /// The entity.
         organ: Entity,
