@@ -51,7 +51,7 @@ impl Mask {
         at_once(Self::image_paced(size, spacing, origin, inside, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`image`](Self::image).
@@ -91,7 +91,7 @@ impl Mask {
         at_once(Self::voxels_paced(size, spacing, origin, inside, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`voxels`](Self::voxels).

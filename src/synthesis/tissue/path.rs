@@ -78,7 +78,7 @@ impl GuidePath {
         at_once(self.over_paced(base, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`over`](Self::over).

@@ -106,7 +106,7 @@ impl PreparedTissue {
         at_once(self.painted_paced(paint, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`painted`](Self::painted).

@@ -41,7 +41,7 @@ impl MeshSurface {
         at_once(Self::new_paced(mesh, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).

@@ -85,7 +85,7 @@ impl MeshVolume {
         at_once(Self::new_paced(mesh, resolution, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
