@@ -109,14 +109,10 @@ pub enum TissueError {
         what: &'static str,
     },
     /// A tissue made from a mesh, without a mesh.
-    #[error(
-        "the tissue is made from the organ's mesh, but there is none; give the organ a mesh, or choose a shape"
-    )]
+    #[error("the tissue is made from the organ's mesh, but there is none; give the organ a mesh, or choose a shape")]
     NoMesh,
     /// A tissue made from an image, without an image.
-    #[error(
-        "the tissue is made from the organ's image, but there is none; give the organ an image, or choose a shape"
-    )]
+    #[error("the tissue is made from the organ's image, but there is none; give the organ an image, or choose a shape")]
     NoImage,
     /// A staged tissue as the stage of another.
     #[error("a stage of a staged tissue cannot be staged itself; list its stages instead")]
