@@ -1,4 +1,4 @@
-//! Holds the source to the rules of the house (`ARCHITECTURE.md`): which room may use which, and what no room may do.
+//! Holds the source to the rules of the house (`ARCHITECTURE.md`): which room may use which, and what is forbidden.
 //!
 //! The rules are checked on the text of the source files, after comments, string literals and unit tests have been
 //! blanked out. The last tests of this file show that the checks can fail. That optional crates stay behind their
@@ -28,11 +28,11 @@ const PURE_CRATES: &[&str] = &[
     "tobj",
 ];
 
-/// Modules of std that the pure half leaves to its callers: clocks, threads, the environment, the network.
+/// Modules of std that the pure half must not use: clocks, threads, the environment, the network.
 const IMPURE_STD: &[&str] = &["time", "thread", "env", "net"];
 
-/// Words that the pure half does without: collections whose order is random, generators that differ between platforms
-/// or versions, and output.
+/// Words that the pure half must not use: collections with random order, generators that differ between platforms or
+/// versions, and output.
 const IMPURE_WORDS: &[&str] = &[
     "HashMap",
     "HashSet",
@@ -48,7 +48,8 @@ const IMPURE_WORDS: &[&str] = &[
     "eprint",
 ];
 
-/// Functions of std that differ in their last bits between platforms. `bevy_math::ops` has the same everywhere.
+/// Functions of std that differ in their last bits between platforms. Those of `bevy_math::ops` are the same
+/// everywhere.
 const UNPORTABLE_MATHS: &[&str] = &[
     "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
     "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt", "hypot",
@@ -60,7 +61,7 @@ const TREE_CHANGERS: &[&str] =
 
 const MOST_LINES: usize = 600;
 
-/// A source file, as the rules see it.
+/// A source file, prepared for the rules.
 struct Source {
     /// Path from the project's root, with `/`.
     path: String,
@@ -89,7 +90,7 @@ impl Source {
         self.module.first().is_some_and(|first| first == room) && self.path.starts_with("src/")
     }
 
-    /// What this file does against the rules, one line each.
+    /// Violations of the rules in this file, one line each.
     fn violations(&self) -> Vec<String> {
         let mut found = Vec::new();
         if self.lines > MOST_LINES {
@@ -164,7 +165,7 @@ impl Source {
     }
 }
 
-/// Replaces comments and the contents of string and character literals by blanks, keeping the lines.
+/// Replaces comments and the contents of string and character literals with blanks, keeping the lines.
 fn blank(text: &str) -> String {
     let chars: Vec<char> = text.chars().collect();
     let mut out = String::with_capacity(text.len());
@@ -181,7 +182,7 @@ fn blank(text: &str) -> String {
     out
 }
 
-/// Where the comment or literal that begins at `at` ends, if one begins there.
+/// End of the comment or literal that begins at `at`, if there is one.
 fn literal_end(chars: &[char], at: usize) -> Option<usize> {
     let rest = &chars[at..];
     let find = |from: usize, what: &str| {
@@ -259,8 +260,8 @@ fn words(text: &str) -> Vec<(usize, &str)> {
     found
 }
 
-/// Every path to another crate or another room: those of `use`, and those written out in the code. Paths within the
-/// crate begin with `crate`; `self` and `super` are resolved.
+/// Every path to another crate or room, in `use` and in the code. Paths within the crate begin with `crate`; `self` and
+/// `super` are resolved.
 fn paths(code: &str, module: &[String]) -> Vec<Vec<String>> {
     let code = without_reflect(code);
     let (uses, rest) = split_uses(&code);
@@ -302,7 +303,7 @@ fn is_primitive(word: &str) -> bool {
     .contains(&word)
 }
 
-/// `Reflect` may be derived on settings behind the feature that brings Bevy: the one engine path of the pure half.
+/// `Reflect` may be derived on settings behind the feature that enables Bevy: the only engine path of the pure half.
 fn without_reflect(code: &str) -> String {
     let mut out = String::new();
     for line in code.split_inclusive('\n') {
@@ -315,7 +316,7 @@ fn without_reflect(code: &str) -> String {
     out
 }
 
-/// Takes the trees of all `use` statements out of the code.
+/// Removes the trees of all `use` statements from the code.
 fn split_uses(code: &str) -> (Vec<String>, String) {
     let mut uses = Vec::new();
     let mut rest = String::new();
@@ -333,7 +334,7 @@ fn split_uses(code: &str) -> (Vec<String>, String) {
     (uses, rest)
 }
 
-/// Writes out the paths of one use tree: `a::{b, c::d as e}` gives `a::b` and `a::c::d`.
+/// Expands the paths of one use tree: `a::{b, c::d as e}` gives `a::b` and `a::c::d`.
 fn expand(tree: &str, prefix: &[String], found: &mut Vec<Vec<String>>) {
     let tree = tree.trim().trim_start_matches("::");
     if let Some(group) = tree.strip_prefix('{') {
@@ -385,7 +386,7 @@ fn every_file_keeps_the_rules_of_the_house() {
     let mut files = 0;
     for path in ["src", "examples", "tests", "benches"].iter().flat_map(|folder| rust_files(&project().join(folder))) {
         let name = path.strip_prefix(project()).unwrap().to_string_lossy().replace('\\', "/");
-        // This file spells out what it looks for.
+        // This file contains the patterns that it looks for.
         if name == "tests/layering.rs" {
             continue;
         }
