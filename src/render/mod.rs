@@ -17,7 +17,6 @@
 //! Without a GPU, or with one that lacks storage buffers (WebGL 2), nothing is drawn and growth goes on, with one
 //! warning.
 
-use crate::synthesis::instances::SegmentInstance;
 use bevy::{
     asset::{AssetEventSystems, embedded_asset},
     camera::{CameraUpdateSystems, visibility::VisibilitySystems},
@@ -27,23 +26,31 @@ use bevy::{
         ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems,
         erased_render_asset::prepare_erased_assets,
         render_asset::prepare_assets,
-        render_resource::{DownlevelFlags, WgpuLimits},
         renderer::{RenderAdapter, RenderDevice},
         storage::GpuShaderBuffer,
     },
 };
 
+mod buffer;
+mod chunk;
 mod detail;
+mod levels;
+mod limits;
 mod material;
 mod segments;
 mod stumps;
 mod template;
 mod upload;
 
+pub use buffer::SegmentBuffer;
+pub use chunk::SegmentChunk;
+pub use limits::SegmentLimits;
 pub use material::{SegmentExtension, SegmentMaterial, VesselMaterials};
-pub use segments::{SegmentBuffer, SegmentChunk};
 
-use detail::{ChunkMeshes, Detail, FEWEST_SLOTS, Shape, choose_detail};
+use buffer::{attach_buffers, detach_buffer};
+use detail::{ChunkMeshes, choose_detail};
+use levels::{Detail, Shape};
+use segments::update_segments;
 use upload::{SegmentWrites, extract_writes, queue_scatter_pipeline, write_segments_to_gpu};
 
 /// Draws the segments of all vessel entities.
@@ -121,7 +128,7 @@ impl Plugin for SegmentRenderPlugin {
             .insert_resource(ChunkMeshes::new(&self.detail()))
             .init_resource::<VesselMaterials>()
             .init_resource::<SegmentWrites>()
-            .add_observer(segments::detach_buffer)
+            .add_observer(detach_buffer)
             .configure_sets(
                 PostUpdate,
                 SegmentSystems
@@ -132,7 +139,7 @@ impl Plugin for SegmentRenderPlugin {
             .add_systems(
                 PostUpdate,
                 (
-                    (segments::attach_buffers, segments::update_segments).chain().in_set(SegmentSystems),
+                    (attach_buffers, update_segments).chain().in_set(SegmentSystems),
                     choose_detail
                         .after(TransformSystems::Propagate)
                         .after(CameraUpdateSystems)
@@ -184,62 +191,9 @@ fn build_render_app(app: &mut App) {
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SegmentSystems;
 
-/// Limits of the GPU. The resource exists only if segments are drawn.
-#[derive(Resource, Clone, Copy, Debug, Reflect)]
-#[reflect(Resource, Clone, Debug)]
-pub struct SegmentLimits {
-    max_segments: usize,
-    segments_per_chunk: usize,
-}
-
-impl SegmentLimits {
-    /// `None` if the vertex stage can't read storage buffers, or compute shaders can't write them.
-    fn new(limits: &WgpuLimits, flags: DownlevelFlags, segments_per_chunk: usize) -> Option<Self> {
-        let needed = DownlevelFlags::VERTEX_STORAGE | DownlevelFlags::COMPUTE_SHADERS;
-        if !flags.contains(needed) || limits.max_storage_buffers_per_shader_stage == 0 {
-            return None;
-        }
-        let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        // mesh tags and node indices are 32-bit
-        let segments = (bytes / SegmentInstance::SIZE as u64).min(1 << 31) as usize;
-        let max_segments = segments - segments % segments_per_chunk;
-        (max_segments >= FEWEST_SLOTS).then_some(Self { max_segments, segments_per_chunk })
-    }
-
-    /// Most segments of one vessel entity that can be drawn: as many as fit in a storage buffer.
-    pub fn max_segments(&self) -> usize {
-        self.max_segments
-    }
-
-    /// Most segments that one chunk entity draws: fewer if their template is very round.
-    pub fn segments_per_chunk(&self) -> usize {
-        self.segments_per_chunk
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const CHUNK: usize = 4096;
-
-    #[test]
-    fn limits_are_whole_chunks_that_fit_in_a_buffer() {
-        let device = WgpuLimits { max_storage_buffer_binding_size: 1 << 20, max_buffer_size: 1 << 30, ..default() };
-        let limits = SegmentLimits::new(&device, DownlevelFlags::all(), CHUNK).unwrap();
-        assert_eq!(limits.max_segments() % CHUNK, 0);
-        let bytes = limits.max_segments() * SegmentInstance::SIZE;
-        assert!(bytes <= 1 << 20 && bytes > (1 << 20) - CHUNK * SegmentInstance::SIZE);
-    }
-
-    #[test]
-    fn devices_that_lack_something_draw_nothing() {
-        for lacking in [DownlevelFlags::VERTEX_STORAGE, DownlevelFlags::COMPUTE_SHADERS] {
-            assert!(SegmentLimits::new(&WgpuLimits::default(), DownlevelFlags::all() - lacking, CHUNK).is_none());
-        }
-        let none = WgpuLimits::downlevel_webgl2_defaults();
-        assert!(SegmentLimits::new(&none, DownlevelFlags::all(), CHUNK).is_none());
-    }
 
     #[test]
     fn settings_outside_their_limits_are_clamped() {

@@ -7,11 +7,7 @@
 //! round end would hide the gap of another is drawn with a flat end. A cut or its undo writes only the slots of its
 //! segments and of neighbours whose look changes.
 
-use super::{
-    detail::FEWEST_SLOTS,
-    segments::{ChunkContents, SegmentBuffer, SegmentStore},
-    upload::SegmentWrite,
-};
+use super::levels::FEWEST_SLOTS;
 use crate::{
     plugin::{Changes, Vessels},
     synthesis::{
@@ -31,15 +27,15 @@ pub(super) struct Stumps {
     /// By node.
     severed: BTreeMap<u32, Severed>,
     /// The further pieces, by their slots behind those of the nodes.
-    slots: Vec<SegmentInstance>,
+    pub(super) slots: Vec<SegmentInstance>,
     /// Free slots, all hidden.
     free: Vec<u32>,
     /// Slots that are not on the GPU yet, possibly with repeats.
-    changed: Vec<u32>,
+    pub(super) changed: Vec<u32>,
     /// First slot in the buffer, as last written.
-    first: usize,
+    pub(super) first: usize,
     /// Chunk entities, in the order of the slots.
-    chunks: Vec<Entity>,
+    pub(super) chunks: Vec<Entity>,
 }
 
 /// One severed segment.
@@ -166,58 +162,11 @@ impl Stumps {
     }
 
     /// Takes the changed slots, as rising runs to be written.
-    fn take_changed(&mut self) -> Vec<Range<usize>> {
+    pub(super) fn take_changed(&mut self) -> Vec<Range<usize>> {
         let mut changed = std::mem::take(&mut self.changed);
         changed.sort_unstable();
         changed.dedup();
         changed.chunk_by(|a, b| a + 1 == *b).map(|run| run[0] as usize..run[run.len() - 1] as usize + 1).collect()
-    }
-}
-
-impl SegmentStore<'_, '_> {
-    /// Moves the stumps behind the nodes' slots, whose number may have changed. The slots that they leave belong, or
-    /// belonged, to nodes, and are hidden.
-    pub(super) fn move_stumps(&mut self, segments: &mut SegmentBuffer) {
-        let first = segments.capacity();
-        let stumps = &mut segments.stumps;
-        if stumps.first == first {
-            return;
-        }
-        let whole_chunks = stumps.slots.len().next_multiple_of(FEWEST_SLOTS);
-        for first in [stumps.first, first].into_iter().filter(|_| whole_chunks > 0) {
-            let mut hidden = SegmentWrite::new(segments.buffer.clone());
-            hidden.extend(first..first + whole_chunks);
-            self.writes.push(hidden);
-        }
-        stumps.first = first;
-        stumps.changed.extend(0..stumps.slots.len() as u32);
-        for chunk in stumps.chunks.drain(..) {
-            self.commands.entity(chunk).try_despawn();
-        }
-    }
-
-    /// Queues changed stumps, and fits the boxes of their chunks.
-    pub(super) fn write_stumps(&mut self, entity: Entity, segments: &mut SegmentBuffer) {
-        let first = segments.stumps.first;
-        let changed = segments.stumps.take_changed();
-        let mut write = SegmentWrite::new(segments.buffer.clone());
-        for run in &changed {
-            let out = write.extend(first + run.start..first + run.end);
-            out.copy_from_slice(&segments.stumps.slots[run.clone()]);
-        }
-        self.writes.push(write);
-        let mut chunks: Vec<usize> =
-            changed.iter().flat_map(|run| run.start / FEWEST_SLOTS..run.end.div_ceil(FEWEST_SLOTS)).collect();
-        chunks.dedup();
-        for chunk in chunks {
-            let slots = segments.stumps.slots[chunk * FEWEST_SLOTS..].iter().take(FEWEST_SLOTS);
-            let mut contents = ChunkContents::default();
-            contents.add(slots);
-            let known = segments.stumps.chunks.get(chunk).copied();
-            let at = first + chunk * FEWEST_SLOTS;
-            let spawned = self.fit_chunk((entity, segments), known, at, &contents, FEWEST_SLOTS);
-            segments.stumps.chunks.extend(spawned);
-        }
     }
 }
 

@@ -13,7 +13,7 @@
 //! Slid to the next coarser level, a level's vertices equal that level's, vertex for vertex, and slide on as those do.
 //! So a chunk can switch from one mesh to the next without a visible change, whatever the thickness of its segments.
 
-use super::detail::{Goal, Level, Shape};
+use super::levels::{Goal, Level, Shape, corner_reach};
 use bevy::{
     asset::RenderAssetUsages,
     math::ops,
@@ -179,18 +179,10 @@ fn corner(side: u32, sides: u32) -> [f32; 2] {
     [reach * cos, reach * sin]
 }
 
-/// Distance of a regular polygon's corners from its centre, for a mean width of 2.
-///
-/// The mean width of a convex figure is its perimeter over π (Cauchy).
-pub(super) fn corner_reach(sides: u32) -> f32 {
-    let half_turn = TAU / 2.0 / sides as f32;
-    half_turn / ops::sin(half_turn)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::detail::{Detail, Shape};
+    use crate::render::levels::Detail;
     use bevy::{math::Vec3, mesh::VertexAttributeValues};
     use std::collections::BTreeSet;
 
