@@ -1,8 +1,8 @@
-//! Work that may take longer than a frame: done at once where it is little, beside the frames where there is a second
-//! thread, and a slice in each frame where there is none.
+//! Work that may take longer than a frame: done at once if it is small, in the task pool if there is a second thread,
+//! and a slice in each frame if there is none.
 //!
-//! In: [paced](crate::synthesis::pace) work, and how many items it goes through. Out: its result, in the same frame or a
-//! later one. Where the work is done never changes what comes out. Who lets go of a [`Job`] stops it.
+//! In: [paced](crate::synthesis::pace) work, and its number of items. Out: its result, in the same frame or a later
+//! one. The result never depends on where the work is done. Dropping a [`Job`] stops it.
 
 use crate::plugin::order::VesselSystems;
 use crate::synthesis::pace::{Pace, at_once};
@@ -32,36 +32,37 @@ use std::{
     time::Duration,
 };
 
-/// Where work is done that takes longer than a frame: tissues, indices, networks and bindings of large organs.
+/// How work that takes longer than a frame is done: tissues, indices, networks and bindings of large organs.
 ///
-/// Changes concern work that begins later; a new [`slice_time`](Self::slice_time) also what is under way.
+/// Changes apply to work that begins later; a new [`slice_time`](Self::slice_time) also to work under way.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub struct JobSettings {
-    /// Who does large work.
+    /// Where large work is done.
     ///
     /// Default: [`JobMode::Auto`].
     pub mode: JobMode,
-    /// Items, such as triangles or nodes, up to which work is done at once, in the frame in which it comes up.
+    /// Largest number of items, such as triangles or nodes, for which work is done at once, in the frame that asks for
+    /// it.
     ///
-    /// Higher values save small organs the frames of waiting, and let single frames take longer: some 3 ms for the default.
+    /// Higher values spare larger organs the wait, and let single frames take longer: some 3 ms for the default.
     ///
-    /// Limits: none; 0 does nothing at once. Default: [`Self::DEFAULT_AT_ONCE`].
+    /// Limits: none; with 0 no work is done at once. Default: [`Self::DEFAULT_AT_ONCE`].
     pub at_once: usize,
-    /// The time that all jobs together have in a frame, where they are done in slices.
+    /// The time in a frame for all jobs together, if they are done in slices.
     ///
-    /// Higher values end them sooner and take more of each frame. Whatever it is, one job goes on a little in each frame, so
-    /// that all come to their end.
+    /// Higher values finish them sooner and take more of each frame. One job always advances a little in each frame, so
+    /// all jobs finish.
     ///
     /// Units: time on this machine. Limits: none. Default: [`Self::DEFAULT_SLICE_TIME`].
     pub slice_time: Duration,
 }
 
 impl JobSettings {
-    /// Items up to which work is done at once.
+    /// Default of [`at_once`](Self::at_once), in items.
     pub const DEFAULT_AT_ONCE: usize = 8192;
-    /// An eighth of a frame at 60 frames a second.
+    /// Default of [`slice_time`](Self::slice_time): an eighth of a frame at 60 frames a second.
     pub const DEFAULT_SLICE_TIME: Duration = Duration::from_millis(2);
 }
 
@@ -71,16 +72,16 @@ impl Default for JobSettings {
     }
 }
 
-/// Who does work that is too large to be done at once.
+/// Where work is done that is too large to be done at once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum JobMode {
-    /// The task pool where it has threads of its own; in a browser, slices.
+    /// In the task pool if that has threads of its own; in a browser, in slices.
     #[default]
     Auto,
-    /// The task pool. In a browser its tasks hold up the frames.
+    /// In the task pool. In a browser its tasks block the frames.
     TaskPool,
-    /// A slice in each frame, on the thread that runs the schedule: of use to try out what a browser does.
+    /// A slice in each frame, on the thread that runs the schedule, as in a browser.
     Slices,
 }
 
@@ -94,7 +95,7 @@ impl JobMode {
     }
 }
 
-/// Begins jobs.
+/// Starts jobs.
 #[derive(SystemParam)]
 pub(crate) struct Jobs<'w> {
     settings: Res<'w, JobSettings>,
@@ -102,7 +103,7 @@ pub(crate) struct Jobs<'w> {
 }
 
 impl Jobs<'_> {
-    /// Items up to which work is done at once.
+    /// Largest number of items for which work is done at once.
     pub(crate) fn at_once(&self) -> usize {
         self.settings.at_once
     }
@@ -112,7 +113,7 @@ impl Jobs<'_> {
         items <= self.at_once()
     }
 
-    /// Begins work on about so many items. If they are few, it is done when this returns.
+    /// Starts work on about so many items. If they are few, it is done when this returns.
     pub(crate) fn start<T, W>(&self, items: usize, work: impl FnOnce(Pace) -> W) -> Job<T>
     where
         T: Send + 'static,
@@ -128,7 +129,7 @@ impl Jobs<'_> {
     }
 }
 
-/// Work that was begun, and its result once it is there. To let go of it stops it.
+/// Work that was started, and its result once it is ready. Dropping it stops the work.
 pub(crate) struct Job<T> {
     work: Work<T>,
     pace: Pace,
@@ -148,7 +149,7 @@ impl<T: Send + 'static> Job<T> {
 
     fn in_task_pool<W: Future<Output = T> + Send + 'static>(work: impl FnOnce(Pace) -> W) -> Self {
         let is_dropped = Arc::<AtomicBool>::default();
-        // A task that was dropped goes no farther than to its next pause.
+        // A dropped task runs no farther than to its next pause.
         let pace = Pace::new({
             let is_dropped = Arc::clone(&is_dropped);
             move || is_dropped.load(Ordering::Relaxed)
@@ -157,7 +158,7 @@ impl<T: Send + 'static> Job<T> {
         Self { work: Work::Task(task), pace, is_dropped }
     }
 
-    /// Whether the result is there.
+    /// Whether the result is ready.
     pub(crate) fn is_done(&self) -> bool {
         match &self.work {
             Work::Done(_) => true,
@@ -171,7 +172,7 @@ impl<T: Send + 'static> Job<T> {
         if self.is_done() { 1.0 } else { self.pace.progress() }
     }
 
-    /// Takes the result out of a job that is done, and lets go of the job.
+    /// Takes the result out of a job that is done, and drops the job.
     pub(crate) fn poll(job: &mut Option<Self>) -> Option<T> {
         let result = match &mut job.as_mut()?.work {
             Work::Done(result) => result.take(),
@@ -204,18 +205,18 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Jobs that are done in slices, on this thread.
 #[derive(Resource, Default)]
 pub(crate) struct JobSlices {
-    /// In the order of their turns. Systems that begin jobs need no exclusive access.
+    /// In the order of their turns. A mutex, so that systems that start jobs need no exclusive access.
     queue: Mutex<VecDeque<Sliced>>,
     clock: Arc<SliceClock>,
 }
 
 struct Sliced {
-    /// Puts its result where the job finds it.
+    /// Stores its result where the job finds it.
     work: Pin<Box<dyn Future<Output = ()> + Send>>,
     is_dropped: Arc<AtomicBool>,
 }
 
-/// When the slices of a frame end.
+/// The time at which the slices of a frame end.
 struct SliceClock {
     zero: Instant,
     /// Nanoseconds since then.
@@ -261,8 +262,8 @@ impl JobSlices {
         Job { work: Work::Slices(result), pace, is_dropped }
     }
 
-    /// Does a frame's slices: of one job until the time is over or it is done, then of the next. The next frame begins with
-    /// the next job.
+    /// Does a frame's slices: of one job until it is done or the time is over, then of the next. The next frame begins
+    /// with the next job.
     fn advance(&self, time: Duration) {
         let mut turns = std::mem::take(&mut *lock(&self.queue));
         turns.retain(|job| !job.is_dropped.load(Ordering::Relaxed));
@@ -281,12 +282,12 @@ impl JobSlices {
     }
 }
 
-/// Begin of a frame: jobs that are done in slices go on.
+/// Advances the jobs that are done in slices, at the start of a frame.
 pub(crate) fn advance_slices(settings: Res<JobSettings>, slices: Res<JobSlices>) {
     slices.advance(settings.slice_time);
 }
 
-/// Registers what jobs need, with the systems of a schedule.
+/// Registers what jobs need, with their system in a schedule.
 pub(crate) fn register(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
     app.init_resource::<JobSettings>().init_resource::<JobSlices>().register_type::<JobSettings>();
     app.add_systems(schedule, advance_slices.before(VesselSystems::Source));

@@ -17,7 +17,7 @@ use crate::{
 };
 use bevy::{asset::RenderAssetUsages, prelude::*, render::storage::ShaderBuffer};
 
-/// What is drawn of a vessel entity: its buffer of segments, its material and its chunks.
+/// The drawn form of a vessel entity: its buffer of segments, its material and its chunks.
 ///
 /// Added to entities with [`Vessels`] and removed with them.
 #[derive(Component, Debug)]
@@ -26,21 +26,21 @@ pub struct SegmentBuffer {
     pub(super) material: Handle<SegmentMaterial>,
     /// The changes that have been drawn.
     pub(super) drawn: ChangeCursor,
-    /// Segments that the buffer has room for.
+    /// Node slots in the buffer.
     pub(super) capacity: usize,
-    /// Slots that may hold something else than hidden segments.
+    /// Slots that may hold segments that are not hidden.
     pub(super) written: usize,
     /// Chunk entities, in the order of their slots.
     pub(super) chunks: Vec<Entity>,
-    /// What is in each chunk.
+    /// The contents of each chunk.
     pub(super) contents: Vec<ChunkContents>,
     pub(super) colors: SegmentColors,
     /// The appearance that `colors` follow, `None` at first.
     look: Option<Look>,
     pub(super) warned_of_limit: bool,
-    /// What severed segments show.
+    /// The remaining pieces of severed segments.
     pub(super) stumps: Stumps,
-    /// Slots that the buffer has for stumps, behind those of the nodes.
+    /// Slots for stumps in the buffer, behind those of the nodes.
     pub(super) room: usize,
 }
 
@@ -52,8 +52,9 @@ impl SegmentBuffer {
 
     /// The buffer that holds this vessel entity's segments, one
     /// [`SegmentInstance`](crate::synthesis::instances::SegmentInstance) per node, for materials and compute shaders of
-    /// your own. From [`capacity`](Self::capacity) on follow the pieces of severed segments beside the first of each, in no
-    /// order. It is on the GPU only, and moves when it grows: ask again after the handle's asset was modified.
+    /// your own. From [`capacity`](Self::capacity) on it holds the further pieces of severed segments, after the first
+    /// of each, in no order. It is on the GPU only, and moves when it grows: get it again after the handle's asset was
+    /// modified.
     pub fn buffer(&self) -> &Handle<ShaderBuffer> {
         &self.buffer
     }
@@ -68,7 +69,7 @@ impl SegmentBuffer {
         self.stumps.chunks()
     }
 
-    /// Nodes' segments that fit before the buffer has to grow.
+    /// Number of nodes whose segments fit before the buffer has to grow.
     pub fn capacity(&self) -> usize {
         self.capacity
     }
@@ -78,12 +79,12 @@ impl SegmentBuffer {
         self.look.is_some()
     }
 
-    /// Whether colours tell the supply.
+    /// Whether colours show the supply.
     pub(super) fn follows_supply(&self) -> bool {
         matches!(self.look, Some(Look::Supply(_)))
     }
 
-    /// Adopts look and supply, and adds the segments that have another colour now.
+    /// Takes over look and supply, and adds the segments whose colour changed.
     pub(super) fn adopt(&mut self, look: Look, vessels: &Vessels, supply: &[f32], changes: &mut Changes) {
         let (tree, births) = (vessels.tree(), vessels.birth_steps());
         if self.look != Some(look) {
@@ -101,7 +102,7 @@ impl SegmentBuffer {
     }
 }
 
-/// What decides the colours.
+/// The inputs of the colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Look {
     Uniform([f32; 3]),
@@ -141,7 +142,7 @@ pub(super) fn attach_buffers(
     mut materials: ResMut<Assets<SegmentMaterial>>,
 ) {
     for (entity, vessels, children) in &new {
-        // Those that came with a scene or a clone draw nothing.
+        // Chunks that came with a scene or a clone draw nothing.
         for &stray in children.into_iter().flatten().filter(|&&child| chunks.contains(child)) {
             commands.entity(stray).try_despawn();
         }
@@ -169,7 +170,7 @@ pub(super) fn attach_buffers(
     }
 }
 
-/// Removes what was drawn of an entity that lost its vessels but lives on.
+/// Removes the chunks of an entity that lost its vessels but still exists.
 pub(super) fn detach_buffer(removed: On<Remove, Vessels>, mut commands: Commands, buffers: Query<&SegmentBuffer>) {
     if let Ok(buffer) = buffers.get(removed.entity) {
         for &chunk in buffer.chunks.iter().chain(buffer.stump_chunks()) {

@@ -6,7 +6,7 @@ use bevy::{
     prelude::*,
 };
 
-/// An entity that draws one chunk of segments. For reading: its mesh follows its size in the picture.
+/// An entity that draws one chunk of segments. Read-only: its mesh follows its size in the picture.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(Component, Clone, Debug)]
 pub struct SegmentChunk {
@@ -16,7 +16,7 @@ pub struct SegmentChunk {
     pub(super) slots: usize,
     /// Its level of detail.
     pub(super) level: usize,
-    /// Level and slots of the mesh that it has.
+    /// Level and slots of its present mesh.
     pub(super) drawn: (usize, usize),
 }
 
@@ -27,7 +27,7 @@ impl SegmentChunk {
     }
 }
 
-/// What a chunk's box and thickness follow from.
+/// The extent of a chunk's segments: gives its box and thickness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct ChunkContents {
     pub(super) bounds: Option<Aabb3d>,
@@ -35,7 +35,7 @@ pub(super) struct ChunkContents {
 }
 
 impl ChunkContents {
-    /// Takes in segments. While vessels grow, what they were before lies within what they are now.
+    /// Adds segments. While vessels grow, their old shapes lie within the new ones.
     pub(super) fn add<'a>(&mut self, segments: impl IntoIterator<Item = &'a SegmentInstance>) {
         for segment in segments.into_iter().filter(|segment| segment.is_visible()) {
             let own = segment.bounds();

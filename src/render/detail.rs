@@ -1,19 +1,19 @@
-//! Levels of detail: which mesh a chunk of segments draws, by the size of its thickest segment in the picture.
+//! Levels of detail: the mesh that a chunk of segments draws, chosen by the size of its thickest segment in the
+//! picture.
 //!
 //! In: the chunks' boxes and thickest radii, and the cameras. Out: each chunk's mesh.
 //!
 //! Nothing pops, by construction. As a segment gets small, the vertex stage slides the corners of its cross-section to
-//! those of the next coarser polygon, and from there to those of the one after it, each vertex by the size of its own end;
-//! a chunk goes to the coarser mesh when all its vertices have slid to it, or beyond as those of its thinnest segments
-//! have, so that both meshes are the same surface. Below a pixel, segments drop out one by one,
-//! and those that are kept are widened, so that vessels cover the same area (Cook, Halstead, Planck & Ryu, "Stochastic
-//! simplification of aggregate detail", 2007); a chunk leaves those out of its mesh whose width has become zero.
-//! Which slots drop first is decided by multiples of the golden ratio, which spread evenly over any run of slots, and over
-//! every second one.
+//! those of the next coarser polygon, and from there to those of the one after it, each vertex by the size of its own
+//! end. A chunk switches to the coarser mesh when all its vertices have slid at least that far, so that both meshes are
+//! the same surface. Below a pixel, segments drop out one by one, and the others are widened, so that vessels cover the
+//! same area (Cook, Halstead, Planck & Ryu, "Stochastic simplification of aggregate detail", 2007). A chunk's mesh
+//! leaves out segments whose width has become zero. Multiples of the golden ratio decide which slots drop first: they
+//! spread evenly over any run of slots, and over every second one.
 //!
-//! A chunk is as fine as the most demanding camera wants it. Prepasses and shadow maps draw the same meshes. In a shadow map
-//! vertices slide by their size there: one much finer than the picture may show a change of level as a slight change of
-//! shade on vessels of a few pixels, within the [tolerance](super::SegmentRenderPlugin::tolerance).
+//! A chunk is as fine as the most demanding camera needs. Prepasses and shadow maps draw the same meshes. In a shadow
+//! map vertices slide by their size there: one much finer than the picture may show a change of level as slightly
+//! changed shading on vessels of a few pixels, within the [tolerance](super::SegmentRenderPlugin::tolerance).
 
 use super::{
     chunk::SegmentChunk,
@@ -30,7 +30,7 @@ use bevy::{
 /// A chunk becomes coarser a little later than it could, so that one at the limit doesn't change all the time.
 const HYSTERESIS: f32 = 0.9;
 
-/// The meshes that chunks share, made when they are needed first.
+/// The meshes that chunks share, made when first needed.
 #[derive(Resource, Debug)]
 pub(super) struct ChunkMeshes {
     levels: Vec<Level>,
@@ -48,7 +48,7 @@ impl ChunkMeshes {
         self.slots
     }
 
-    /// The level at which a chunk is drawn that was at `level` before, when its thickest radius has so many pixels.
+    /// The level of a chunk that was at `level` before and whose thickest radius has so many pixels.
     fn level(&self, level: usize, radius: f32) -> usize {
         let coarsest = |radius: f32| self.levels.iter().rposition(|level| radius < level.drawn_below).unwrap_or(0);
         coarsest(radius).min(coarsest(radius / HYSTERESIS).max(level))
@@ -61,7 +61,7 @@ impl ChunkMeshes {
     }
 }
 
-/// Gives every chunk the mesh that its size in the picture asks for.
+/// Gives every chunk the mesh for its size in the picture.
 pub(super) fn choose_detail(
     cameras: Query<(&Camera, &GlobalTransform), With<Camera3d>>,
     mut chunks: Query<(&mut SegmentChunk, &mut Mesh3d, &Aabb, &GlobalTransform)>,
@@ -80,7 +80,7 @@ pub(super) fn choose_detail(
     }
 }
 
-/// What decides the size of things in a camera's picture.
+/// The part of a camera that decides the size of things in its picture.
 struct Eye {
     /// Dot product with a point in the world: its depth, by which sizes are divided. 1 without perspective.
     depth: Vec4,
@@ -97,7 +97,7 @@ impl Eye {
         Some(Self { depth, focal_length: 0.5 * height * clip_from_view.y_axis.y.abs() })
     }
 
-    /// The most pixels that a unit length may have, anywhere in a box. Infinite where it reaches behind the camera.
+    /// The most pixels that a unit length may have, anywhere in a box. Huge if the box reaches behind the camera.
     fn pixels_per_length(&self, place: &Affine3A, aabb: &Aabb) -> f32 {
         let direction = Vec3A::from(self.depth.truncate());
         let across = place.matrix3.transpose() * direction;
@@ -107,7 +107,7 @@ impl Eye {
     }
 }
 
-/// The greatest length that a unit length along an axis gets. `segments.wgsl` computes the same.
+/// The greatest scale along an axis. `segments.wgsl` computes the same.
 fn largest_scale(place: &Affine3A) -> f32 {
     let axes = place.matrix3;
     axes.x_axis.length_squared().max(axes.y_axis.length_squared()).max(axes.z_axis.length_squared()).sqrt()

@@ -6,17 +6,17 @@
 use bevy::math::ops;
 use std::f32::consts::PI;
 
-/// The least number of slots in a mesh: what little vessels draw.
+/// The least number of slots in a mesh, for small vessel trees.
 pub(super) const FEWEST_SLOTS: usize = 256;
-/// The most slots in a mesh: fewer chunks for the CPU, none of them too large for a mesh to be made in a frame.
+/// The most slots in a mesh: few chunks for the CPU, with meshes small enough to be made in a frame.
 const MOST_SLOTS: usize = 4096;
-/// Vertices that a mesh of the finest level may have, but for very round segments, of which [`FEWEST_SLOTS`] have more.
+/// Most vertices in a mesh of the finest level, unless [`FEWEST_SLOTS`] very round segments need more.
 const MOST_VERTICES: usize = 1 << 17;
 /// Sides of the levels below the finest.
 const COARSER_SIDES: [u32; 3] = [8, 5, 3];
 /// Strides of the levels that leave slots out.
 const STRIDES: [usize; 6] = [2, 4, 8, 16, 32, 64];
-/// Share by which a slot's threshold may be passed before it is gone: it gets thinner on the way. `segments.wgsl` has it too.
+/// Share beyond its threshold at which a slot is gone: it gets thinner up to there. Also in `segments.wgsl`.
 const FADE: f32 = 0.25;
 /// How round a segment is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Level {
     pub(super) shape: Shape,
-    /// What the level's vertices slide to, one after the other.
+    /// The shapes to which the level's vertices slide, one after the other.
     pub(super) goals: Vec<Goal>,
     /// One of about this many slots is in the mesh.
     pub(super) stride: usize,
@@ -66,18 +66,18 @@ impl Level {
         u64::from(threshold(slot)) * (self.stride as u64) < 1 << 32
     }
 
-    /// The largest share of all segments that may be kept, so that those not in the mesh aren't missed.
+    /// The largest share of all segments that may be kept, so that no segment missing in the mesh should be drawn.
     pub(super) fn most_kept(&self) -> f32 {
         if self.stride == 1 { 1.0 } else { 1.0 / (self.stride as f32 * (1.0 + FADE)) }
     }
 }
 
-/// The share of segments below which a slot drops out, times 2³². `segments.wgsl` computes the same.
+/// The share of kept segments below which a slot drops out, times 2³². `segments.wgsl` computes the same.
 fn threshold(slot: usize) -> u32 {
     (slot as u32).wrapping_mul(0x9e37_79b9)
 }
 
-/// What the levels follow from: the settings of the plugin, checked.
+/// The checked settings of the plugin, which determine the levels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Detail {
     /// The finest shape.
@@ -115,7 +115,7 @@ impl Detail {
         levels
     }
 
-    /// Radius in pixels from which on all slots but one of `stride` have width zero.
+    /// Radius in pixels below which all slots but one of `stride` have width zero.
     fn dropped_below(&self, stride: usize) -> f32 {
         0.5 * self.least_width / (stride as f32 * (1.0 + FADE))
     }
@@ -127,7 +127,7 @@ impl Detail {
     }
 }
 
-/// Distance of a regular polygon's corners from its centre, where its mean width is 2.
+/// Distance of a regular polygon's corners from its centre, for a mean width of 2.
 ///
 /// The mean width of a convex figure is its perimeter over π (Cauchy).
 pub(super) fn corner_reach(sides: u32) -> f32 {
@@ -152,7 +152,8 @@ mod tests {
                     assert_eq!(pair[0].goals[0], Goal { shape: pair[1].shape, slid_below: pair[1].drawn_below });
                     assert_eq!(pair[0].goals[1..], pair[1].goals, "from there on they go together");
                 }
-                // vertices set out at twice the size at which they arrive: not before they have arrived at the goal before
+                // vertices set out at twice the size at which they arrive, and not before they reached the previous
+                // goal
                 assert!(pair[0].goals.windows(2).all(|goals| 2.0 * goals[1].slid_below <= goals[0].slid_below));
                 let [fine, coarse] = [0, 1].map(|i| pair[i].shape.vertices() * 1000 / pair[i].stride);
                 assert!(coarse < fine, "{pair:?}");

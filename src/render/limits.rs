@@ -7,7 +7,7 @@ use bevy::{
     render::render_resource::{DownlevelFlags, WgpuLimits},
 };
 
-/// What the GPU can take. Present only where segments are drawn.
+/// Limits of the GPU. The resource exists only if segments are drawn.
 #[derive(Resource, Clone, Copy, Debug, Reflect)]
 #[reflect(Resource, Clone, Debug)]
 pub struct SegmentLimits {
@@ -16,7 +16,7 @@ pub struct SegmentLimits {
 }
 
 impl SegmentLimits {
-    /// `None` when the vertex stage can't read storage buffers, or compute shaders can't write them.
+    /// `None` if the vertex stage can't read storage buffers, or compute shaders can't write them.
     pub(super) fn new(limits: &WgpuLimits, flags: DownlevelFlags, segments_per_chunk: usize) -> Option<Self> {
         let needed = DownlevelFlags::VERTEX_STORAGE | DownlevelFlags::COMPUTE_SHADERS;
         if !flags.contains(needed) || limits.max_storage_buffers_per_shader_stage == 0 {
@@ -29,12 +29,12 @@ impl SegmentLimits {
         (max_segments >= FEWEST_SLOTS).then_some(Self { max_segments, segments_per_chunk })
     }
 
-    /// Segments of one vessel entity that can be drawn: those that fit in a storage buffer.
+    /// Most segments of one vessel entity that can be drawn: as many as fit in a storage buffer.
     pub fn max_segments(&self) -> usize {
         self.max_segments
     }
 
-    /// Segments that one chunk entity draws at most: fewer where their template is very round.
+    /// Most segments that one chunk entity draws: fewer if their template is very round.
     pub fn segments_per_chunk(&self) -> usize {
         self.segments_per_chunk
     }

@@ -1,21 +1,21 @@
 //! Drawing: vessels as instanced segments, lit by Bevy's own materials.
 //!
-//! In: [`Vessels`](crate::plugin::Vessels) and the chunks of them that [`ChangeLog`](crate::plugin::ChangeLog)
-//! marks. Out: a picture, with shadows, prepasses and multisampling.
+//! In: [`Vessels`](crate::plugin::Vessels) and the changes that [`ChangeLog`](crate::plugin::ChangeLog) marks. Out: a
+//! picture, with shadows, prepasses and multisampling.
 //!
 //! A vessel entity, however large, is a handful of chunk entities that share a few meshes: many copies of a template cone
 //! with round ends. The vertex stage looks up each copy's end points and radii in a storage buffer and shapes it there.
-//! Growth rewrites only the slots that changed; with nothing changed, nothing happens. Severed segments show what is left of
-//! them, see `stumps`, with a view into the lumen. Chunks are children of the vessel
-//! entity, which is a child of the organ: transforms, visibility and despawning follow the hierarchy. Each chunk has its own
-//! bounding box, so parts outside the view are not drawn; and each has the level of detail that its size in the picture asks
-//! for.
+//! Growth rewrites only the slots that changed; without a change nothing happens. Severed segments show their remaining
+//! pieces (see `stumps`), with a view into the lumen. Chunks are children of the vessel entity, which is a child of the
+//! organ: transforms, visibility and despawning follow the hierarchy. Each chunk has its own bounding box, so that
+//! parts outside the view are not drawn, and the level of detail for its size in the picture.
 //!
-//! A chunk has up to 4096 segments, which makes an idle frame of a million segments cheap for the CPU: what Bevy does for
-//! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often: vessels
-//! grow everywhere at once, so 256 segments that follow one another reach over three quarters of an organ already.
+//! A chunk has up to 4096 segments, which makes an idle frame of a million segments cheap for the CPU: Bevy's work for
+//! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often:
+//! vessels grow everywhere at once, so even 256 consecutive segments reach over three quarters of an organ.
 //!
-//! Without a GPU, or with one that lacks storage buffers (WebGL 2), nothing is drawn and growth goes on: one warning says so.
+//! Without a GPU, or with one that lacks storage buffers (WebGL 2), nothing is drawn and growth goes on, with one
+//! warning.
 
 use bevy::{
     asset::{AssetEventSystems, embedded_asset},
@@ -61,7 +61,7 @@ use upload::{SegmentWrites, extract_writes, queue_scatter_pipeline, write_segmen
 pub struct SegmentRenderPlugin {
     /// Corners of a vessel's cross-section.
     ///
-    /// More are rounder and slower: 6 suits millions of thin segments, 16 a close look.
+    /// More are rounder and slower: 6 suits millions of thin segments, 16 suits close views.
     ///
     /// Limits: 3 to 64, clamped. Default: [`Self::DEFAULT_SIDES`].
     pub sides: u32,
@@ -71,18 +71,18 @@ pub struct SegmentRenderPlugin {
     ///
     /// Limits: 0 to 16, clamped. Default: [`Self::DEFAULT_CAP_RINGS`].
     pub cap_rings: u32,
-    /// How far the outline of a segment may be from that of its true shape before it gets fewer corners.
+    /// Largest error of a segment's outline that drawing it with fewer corners may cause.
     ///
-    /// Higher values draw distant vessels faster, and more angular. 0 keeps all corners at any distance.
+    /// Higher values draw distant vessels faster and more angular. 0 keeps all corners at any distance.
     ///
     /// Units: pixels. Limits: 0 to 2, clamped. Default: [`Self::DEFAULT_TOLERANCE`].
     pub tolerance: f32,
-    /// Width below which segments drop out. The fewer are left, the wider they are drawn, so that vessels keep the part of
-    /// the picture that they cover, don't sparkle, and an organ far away costs little.
+    /// Width below which segments drop out. The fewer are left, the wider they are drawn, so that vessels cover the
+    /// same area and don't sparkle. A distant organ costs little.
     ///
-    /// Higher values are faster, and turn thin vessels into dots sooner. Half a pixel suits 4× multisampling, which shows
-    /// what is so thin as a continuous line; without multisampling, 1 keeps distant vessels from sparkling. At 0 every
-    /// segment is drawn, however small, and is seen or not as chance will have it.
+    /// Higher values are faster, and turn thin vessels into dots sooner. Half a pixel suits 4× multisampling, which
+    /// shows such thin vessels as continuous lines; without multisampling, 1 keeps distant vessels from sparkling. At 0
+    /// every segment is drawn, however small, and chance decides whether it is visible.
     ///
     /// Units: pixels. Limits: 0 to 2, clamped. Default: [`Self::DEFAULT_LEAST_WIDTH`].
     pub least_width: f32,
@@ -178,8 +178,8 @@ fn build_render_app(app: &mut App) {
         .add_systems(ExtractSchedule, extract_writes)
         .add_systems(
             Render,
-            // Bevy doesn't order materials after the buffers that they bind: one that grew must be there first, or its
-            // material would go on drawing from the old one
+            // Bevy doesn't order materials after the buffers that they bind: a buffer that grew must be ready first, or
+            // its material would go on drawing from the old one
             write_segments_to_gpu
                 .in_set(RenderSystems::PrepareAssets)
                 .after(prepare_assets::<GpuShaderBuffer>)
@@ -187,7 +187,7 @@ fn build_render_app(app: &mut App) {
         );
 }
 
-/// The systems that bring drawn segments up to date, in `PostUpdate`, before transforms are propagated.
+/// The systems that update drawn segments, in `PostUpdate`, before transforms are propagated.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SegmentSystems;
 

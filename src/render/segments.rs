@@ -47,7 +47,7 @@ pub(super) struct DrawnVessels {
     segments: &'static mut SegmentBuffer,
 }
 
-/// Brings buffers, boxes and chunks up to date with trees and colours that changed.
+/// Updates buffers, boxes and chunks from changed trees and colours.
 pub(super) fn update_segments(
     mut drawn: Query<DrawnVessels>,
     appearances: Query<Ref<VesselAppearance>>,
@@ -81,7 +81,7 @@ pub(super) fn update_segments(
 }
 
 impl SegmentStore<'_, '_> {
-    /// How many of `len` nodes can be drawn beside the stumps; says so once when those are not all.
+    /// Number of `len` nodes that can be drawn beside the stumps; warns once if not all can.
     fn drawable(&self, entity: Entity, len: usize, segments: &mut SegmentBuffer) -> usize {
         let stumps = segments.stumps.room();
         let most = self.limits.max_segments().saturating_sub(stumps);
@@ -105,7 +105,7 @@ impl SegmentStore<'_, '_> {
             if let Some(mut buffer) = self.buffers.get_mut(&segments.buffer) {
                 buffer.resize_in_place(((segments.capacity + room) * SegmentInstance::SIZE) as u64);
             }
-            // a mutable look at the material makes its bind group anew, with the larger buffer
+            // mutable access to the material makes its bind group again, with the larger buffer
             if let Some(mut material) = self.materials.get_mut(&segments.material) {
                 material.extension.segments = segments.buffer.clone();
             }
@@ -118,7 +118,7 @@ impl SegmentStore<'_, '_> {
         }
     }
 
-    /// Queues the segments that changed, and takes them into their chunks.
+    /// Queues the segments that changed, and adds them to their chunks.
     fn write(&mut self, vessels: &Vessels, changes: &Changes, segments: &mut SegmentBuffer, len: usize) {
         let slots = self.templates.slots();
         if changes.is_all() {
@@ -137,13 +137,13 @@ impl SegmentStore<'_, '_> {
             segments.stumps.replace(nodes, out);
             contents.add(&*out);
         }
-        // what a longer tree left behind
+        // slots left over from a longer tree
         write.extend(left_behind);
         segments.written = len;
         self.writes.push(write);
     }
 
-    /// Gives chunks that changed their boxes, and spawns those that are missing.
+    /// Updates the boxes of changed chunks, and spawns missing chunks.
     fn fit_chunks(&mut self, entity: Entity, segments: &mut SegmentBuffer, len: usize) {
         let full = self.templates.slots();
         for chunk in 0..segments.contents.len() {
@@ -155,7 +155,7 @@ impl SegmentStore<'_, '_> {
         }
     }
 
-    /// Gives a chunk its box. Spawns one that is not known yet, from its first slot, and returns it.
+    /// Gives a chunk its box. A chunk that is not known yet is spawned, from its first slot, and returned.
     fn fit_chunk(
         &mut self,
         (entity, segments): (Entity, &SegmentBuffer),
@@ -182,8 +182,8 @@ impl SegmentStore<'_, '_> {
         Some(self.commands.spawn((drawing, drawn, aabb, NoAutoAabb, ChildOf(entity))).id())
     }
 
-    /// Lets the stumps begin behind the nodes' slots, of which the buffer may have another number now. What they leave behind
-    /// becomes slots of nodes, or was, and is hidden.
+    /// Moves the stumps behind the nodes' slots, whose number may have changed. The slots that they leave belong, or
+    /// belonged, to nodes, and are hidden.
     fn move_stumps(&mut self, segments: &mut SegmentBuffer) {
         let first = segments.capacity();
         let stumps = &mut segments.stumps;
@@ -203,7 +203,7 @@ impl SegmentStore<'_, '_> {
         }
     }
 
-    /// Queues the stumps that changed, and fits the boxes of their chunks.
+    /// Queues changed stumps, and fits the boxes of their chunks.
     fn write_stumps(&mut self, entity: Entity, segments: &mut SegmentBuffer) {
         let first = segments.stumps.first;
         let changed = segments.stumps.take_changed();

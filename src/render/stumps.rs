@@ -1,11 +1,11 @@
-//! What is left of cut vessels: more pieces than their segments have slots.
+//! The remaining pieces of cut vessels, which need more slots than their segments have.
 //!
 //! In: the [`Wounds`] of a tree and the nodes whose segments changed. Out: the segments that are drawn instead.
 //!
-//! Growth's rule stands: slot `i` of the buffer belongs to node `i`. A severed segment shows its first piece there, and one
-//! whose round end would hide the gap of another is shown flat. Its
-//! further pieces have slots behind those of all nodes, in chunks of their own, with their own boxes. A cut, like its
-//! undoing, writes the slots of its segments, of those beside them that look otherwise then, and no others.
+//! As during growth, slot `i` of the buffer belongs to node `i`. A severed segment shows its first piece there; its
+//! further pieces have slots behind those of all nodes, in chunks of their own, with their own boxes. A segment whose
+//! round end would hide the gap of another is drawn with a flat end. A cut or its undo writes only the slots of its
+//! segments and of neighbours whose look changes.
 
 use super::levels::FEWEST_SLOTS;
 use crate::{
@@ -19,20 +19,20 @@ use crate::{
 use bevy::prelude::*;
 use std::{collections::BTreeMap, ops::Range};
 
-/// The severed segments of one vessel entity, as they are drawn.
+/// The severed segments of one vessel entity, as drawn.
 #[derive(Debug, Default)]
 pub(super) struct Stumps {
-    /// Which ends of segments are flat, as it follows from wounds and tree.
+    /// The flat ends of segments, derived from wounds and tree.
     flat: FlatEnds,
     /// By node.
     severed: BTreeMap<u32, Severed>,
     /// The further pieces, by their slots behind those of the nodes.
     pub(super) slots: Vec<SegmentInstance>,
-    /// Slots that are free, each hidden.
+    /// Free slots, all hidden.
     free: Vec<u32>,
-    /// Slots that are not on the GPU yet; some more than once.
+    /// Slots that are not on the GPU yet, possibly with repeats.
     pub(super) changed: Vec<u32>,
-    /// Where the slots begin in the buffer, as it was written last.
+    /// First slot in the buffer, as last written.
     pub(super) first: usize,
     /// Chunk entities, in the order of the slots.
     pub(super) chunks: Vec<Entity>,
@@ -41,7 +41,7 @@ pub(super) struct Stumps {
 /// One severed segment.
 #[derive(Debug)]
 struct Severed {
-    /// What its own slot shows.
+    /// The piece in its own slot.
     own: SegmentInstance,
     /// Slots of its further pieces.
     further: Vec<u32>,
@@ -53,18 +53,18 @@ impl Stumps {
         &self.chunks
     }
 
-    /// Slots that the buffer has to have room for, whole chunks. There is always room for the first cuts.
+    /// Number of slots that the buffer needs, in whole chunks. There is always room for the first cuts.
     pub(super) fn room(&self) -> usize {
         self.slots.len().next_power_of_two().max(FEWEST_SLOTS)
     }
 
-    /// Takes in which segments changed, and adds to them those that look otherwise because of that.
+    /// Reads the changed segments, and adds those whose look changes because of them.
     ///
-    /// Where no more than wounds changed, the cost is that of the segments that did; where the tree is other than before
-    /// (`of_tree`), that of all wounds.
+    /// If only wounds changed, the cost is that of the changed segments; if the tree changed (`of_tree`), that of all
+    /// wounds.
     pub(super) fn note(&mut self, wounds: Option<&Wounds>, vessels: &Vessels, of_tree: bool, changes: &mut Changes) {
         let Some(wounds) = wounds else {
-            // All segments count as changed where a ledger is gone.
+            // All segments count as changed after the ledger is removed.
             self.flat = FlatEnds::default();
             return;
         };
@@ -79,9 +79,9 @@ impl Stumps {
         others.into_iter().for_each(|node| changes.add(node.index()));
     }
 
-    /// Takes in what became of the segments that changed, and forgets those of nodes from `len` on.
+    /// Updates the changed segments, and drops those of nodes from `len` on.
     ///
-    /// The cost is that of what is severed, however much else has changed.
+    /// The cost is that of the severed segments, however many others have changed.
     pub(super) fn update(
         &mut self,
         wounds: Option<&Wounds>,
@@ -151,7 +151,7 @@ impl Stumps {
         }
     }
 
-    /// Puts the first pieces in place of the segments in `out`, which are those of `nodes`, in rising order.
+    /// Puts the first pieces in place of the segments in `out`, which are those of `nodes` in rising order.
     pub(super) fn replace(&self, nodes: &[u32], out: &mut [SegmentInstance]) {
         let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else { return };
         for (node, severed) in self.severed.range(first..=last) {
@@ -161,7 +161,7 @@ impl Stumps {
         }
     }
 
-    /// Runs of slots to be written, rising, and then no longer changed.
+    /// Takes the changed slots, as rising runs to be written.
     pub(super) fn take_changed(&mut self) -> Vec<Range<usize>> {
         let mut changed = std::mem::take(&mut self.changed);
         changed.sort_unstable();

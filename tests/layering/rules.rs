@@ -25,11 +25,11 @@ const PURE_CRATES: &[&str] = &[
     "tobj",
 ];
 
-/// Modules of std that the pure half leaves to its callers: clocks, threads, the environment, the network.
+/// Modules of std that the pure half must not use: clocks, threads, the environment, the network.
 const IMPURE_STD: &[&str] = &["time", "thread", "env", "net"];
 
-/// Words that the pure half does without: collections whose order is random, generators that differ between platforms
-/// or versions, and output.
+/// Words that the pure half must not use: collections with random order, generators that differ between platforms or
+/// versions, and output.
 const IMPURE_WORDS: &[&str] = &[
     "HashMap",
     "HashSet",
@@ -45,7 +45,8 @@ const IMPURE_WORDS: &[&str] = &[
     "eprint",
 ];
 
-/// Functions of std that differ in their last bits between platforms. `bevy_math::ops` has the same everywhere.
+/// Functions of std that differ in their last bits between platforms. Those of `bevy_math::ops` are the same
+/// everywhere.
 const UNPORTABLE_MATHS: &[&str] = &[
     "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
     "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt", "hypot",
@@ -57,7 +58,7 @@ const TREE_CHANGERS: &[&str] = &["src/synthesis/tree/", "src/synthesis/colonizat
 const MOST_LINES: usize = 600;
 
 impl Source {
-    /// What this file does against the rules, one line each.
+    /// Violations of the rules in this file, one line each.
     fn violations(&self) -> Vec<String> {
         let mut found = Vec::new();
         if self.lines > MOST_LINES {

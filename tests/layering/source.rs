@@ -65,7 +65,7 @@ impl Source {
     }
 }
 
-/// Replaces comments and the contents of string and character literals by blanks, keeping the lines.
+/// Replaces comments and the contents of string and character literals with blanks, keeping the lines.
 fn blank(text: &str) -> String {
     let chars: Vec<char> = text.chars().collect();
     let mut out = String::with_capacity(text.len());
@@ -82,7 +82,7 @@ fn blank(text: &str) -> String {
     out
 }
 
-/// Where the comment or literal that begins at `at` ends, if one begins there.
+/// End of the comment or literal that begins at `at`, if there is one.
 fn literal_end(chars: &[char], at: usize) -> Option<usize> {
     let rest = &chars[at..];
     let find = |from: usize, what: &str| {
@@ -220,7 +220,7 @@ fn is_primitive(word: &str) -> bool {
     .contains(&word)
 }
 
-/// `Reflect` may be derived on settings behind the feature that brings Bevy: the one engine path of the pure half.
+/// `Reflect` may be derived on settings behind the feature that enables Bevy: the only engine path of the pure half.
 fn without_reflect(code: &str) -> String {
     let mut out = String::new();
     for line in code.split_inclusive('\n') {

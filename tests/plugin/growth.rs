@@ -1,4 +1,4 @@
-//! An organ grows, and obeys.
+//! An organ grows, and follows commands.
 
 use crate::*;
 use bevy_vessels::plugin::{EntityCommandsExt, GrowthControl, GrowthFinished, GrowthFrame, GrowthStarted, diagnostics};

@@ -1,8 +1,8 @@
-//! Circulate: the blood of organs with a [`Perfusion`], made to flow.
+//! Circulate: makes the blood of organs with a [`Perfusion`] flow.
 //!
 //! In: [`Vessels`](crate::plugin::Vessels) at rest and the organ's settings. Out: the flow in [`CirculationState`].
-//! Networks are made in jobs. The same vessels, actions and time steps lose the same to the last bit, as long as no
-//! network is on its way.
+//! Jobs make the networks. The same vessels, actions and time steps give the same blood loss to the last bit, while no
+//! network is being made.
 
 use crate::plugin::{
     announcer::Announcer,
@@ -39,7 +39,7 @@ use bevy::ecs::{
     world::EntityWorldMut,
 };
 
-/// Gives a patient to organs that find none, and their vessels what is to be written on them.
+/// Gives a patient to organs that find none, and the written components to their vessels.
 pub(crate) fn prepare_organs(
     mut commands: Commands,
     organs: Query<(Entity, Option<&OrganVessels>), With<Perfusion>>,
@@ -58,7 +58,7 @@ pub(crate) fn prepare_organs(
     }
 }
 
-/// Makes the flow of vessels that are new, have grown, or are to be perfused otherwise.
+/// Makes the flow of vessels that are new, have grown, or have a changed perfusion.
 pub(crate) fn make_flow(
     mut organs: Query<PerfusedOrgan>,
     vessels: Query<Perfused>,
@@ -88,7 +88,7 @@ impl PerfusedOrganItem<'_, '_> {
         made_for
     }
 
-    /// Whether another flow is to be made than there is.
+    /// Whether a new flow has to be made.
     fn takes_note_of(&mut self, made_for: MadeFor) -> bool {
         let mut is_new = self.state.made_for != Some(made_for);
         if self.perfusion.is_changed() {
@@ -99,7 +99,7 @@ impl PerfusedOrganItem<'_, '_> {
         is_new
     }
 
-    /// Begins to make a flow. Large trees wait until they have grown.
+    /// Starts making a flow. Large trees wait until they have grown.
     fn begin(&mut self, made_for: MadeFor, vessels: &Query<Perfused>, messages: &mut BleedingMessages, jobs: &Jobs) {
         let is_other = self.state.made_for.is_some_and(|before| before.is_replaced_by(&made_for));
         self.state.made_for = Some(made_for);
@@ -135,7 +135,7 @@ impl PerfusedOrganItem<'_, '_> {
         trees
     }
 
-    /// Nothing is left of the blood in other vessels, whose ends are gone.
+    /// Drops the flow of replaced vessels, whose ends no longer exist.
     fn forget(&mut self, vessels: &Query<Perfused>, messages: &mut BleedingMessages) {
         for found in each_kind(self.entities(), vessels) {
             let kind = found.vessels.kind();
@@ -159,7 +159,7 @@ impl PerfusedOrganItem<'_, '_> {
         self.loss.set_if_neq(BloodLoss::default());
     }
 
-    /// Other settings of the bleeding begin the clotting anew.
+    /// Restarts the clotting if the bleeding settings changed.
     fn follow_bleeding_settings(&mut self) -> Result<(), FlowError> {
         let settings = self.perfusion.bleeding;
         for bleeding in self.state.bleeding.values_mut() {
@@ -178,7 +178,7 @@ impl PerfusedOrganItem<'_, '_> {
     }
 }
 
-/// An organ that is to have no blood any more.
+/// Removes the flow of an organ that lost its [`Perfusion`].
 pub(crate) fn remove_circulation(
     removed: On<Remove, Perfusion>,
     organs: Query<&OrganVessels>,
@@ -200,7 +200,7 @@ pub(crate) fn remove_circulation(
     });
 }
 
-/// Vessels whose ledger is gone have no gaps: those that were laid are taken off.
+/// Takes the gaps off vessels whose ledger was removed.
 pub(crate) fn lay_again(
     removed: On<Remove, VesselWounds>,
     vessels: Query<&VesselsOf>,

@@ -6,39 +6,39 @@ use crate::plugin::{
 };
 use crate::synthesis::haemodynamics::FlowError;
 
-/// A gauge, with what it has measured.
+/// A gauge with its measurement.
 pub(super) type Outcome = Result<(Box<SupplyGauge>, Measured), FlowError>;
 
-/// When the supply of an organ is measured, and with what.
+/// Schedules the measurements of an organ's supply.
 #[derive(Debug, Default)]
 pub(crate) struct Gauge {
-    /// `None` before the first measurement, and while the job has it.
+    /// `None` before the first measurement, and while the job owns it.
     gauge: Option<Box<SupplyGauge>>,
     pub(super) job: Option<Job<Outcome>>,
     /// Whether the organ's vessels have grown, so that there is something to measure.
     pub(super) is_ready: bool,
-    /// Whether something was done to the vessels since it was measured.
+    /// Whether the vessels were operated on since the last measurement.
     is_due: bool,
-    /// Seconds since it was measured.
+    /// Seconds since the last measurement.
     age: f64,
-    /// Whether blood was lost since.
+    /// Whether blood was lost since then.
     bled: bool,
     /// [`Perfusion::ischaemic_below`](crate::plugin::Perfusion::ischaemic_below) when it was measured.
     ischaemic_below: f32,
 }
 
 impl Gauge {
-    /// Measures as soon as can be.
+    /// A gauge that is to measure as soon as possible.
     pub(crate) fn ready() -> Self {
         Self { is_ready: true, is_due: true, ..Self::default() }
     }
 
-    /// Measures after an action.
+    /// Demands a measurement after an action.
     pub(crate) fn demand(&mut self) {
         self.is_due = true;
     }
 
-    /// Takes note of time that passed.
+    /// Adds time that has passed.
     pub(crate) fn pass(&mut self, seconds: f64, bled: bool) {
         self.age += seconds;
         self.bled |= bled;
@@ -50,14 +50,14 @@ impl Gauge {
         self.is_ready && self.job.is_none() && (self.is_due || is_old || is_other)
     }
 
-    /// Hands out what is measured with, and begins to count anew.
+    /// Hands out the gauge, and restarts the count.
     pub(super) fn begin(&mut self, ischaemic_below: f32) -> Option<Box<SupplyGauge>> {
         let gauge = self.gauge.take();
         *self = Self { is_ready: true, ischaemic_below, ..Self::default() };
         gauge
     }
 
-    /// What has been measured, and keeps what it was measured with.
+    /// Returns the measurement, and keeps the gauge.
     pub(super) fn accept(&mut self, outcome: Outcome) -> Result<Measured, FlowError> {
         let (gauge, measured) = outcome?;
         self.gauge = Some(gauge);

@@ -1,4 +1,4 @@
-//! Circulation: blood flows through an organ's vessels, leaves them where they are open, and reaches the tissue or doesn't.
+//! Circulation: blood flows through an organ's vessels, leaves through open ends, and supplies the tissue.
 
 use crate::plugin::{
     order::{self, VesselSystems},
@@ -28,8 +28,7 @@ pub use patient::Patient;
 pub use perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply};
 pub use state::CirculationState;
 
-/// Lets blood flow through the vessels of organs with a [`Perfusion`]. Adds the [`SurgeryPlugin`], without which nothing
-/// would bleed.
+/// Lets blood flow through the vessels of organs with a [`Perfusion`]. Adds the [`SurgeryPlugin`], which opens vessels.
 #[derive(Clone, Debug)]
 pub struct CirculationPlugin {
     schedule: Interned<dyn ScheduleLabel>,

@@ -17,7 +17,7 @@ use bevy::{
     log::warn,
 };
 
-/// A vessel entity, with all that flow reads.
+/// A vessel entity, with all that the flow reads.
 #[derive(QueryData)]
 pub(crate) struct Perfused {
     pub(crate) entity: Entity,
@@ -26,7 +26,7 @@ pub(crate) struct Perfused {
     pub(crate) entities: Option<&'static OpenEndEntities>,
 }
 
-/// An organ with blood, and what its vessels grow from.
+/// An organ with blood, and its growth.
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(crate) struct PerfusedOrgan {
@@ -45,10 +45,10 @@ impl PerfusedOrganItem<'_, '_> {
         self.vessels.map_or(&[], OrganVessels::entities)
     }
 
-    /// The blood stands still until something changes.
+    /// Stops the blood until something changes.
     pub(crate) fn fail(&mut self, error: FlowError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
-        warn!("{organ}: its blood stands still: {error}");
+        warn!("{organ}: its blood does not flow: {error}");
         self.state.job = None;
         self.state.flow = None;
         self.state.ends.values_mut().for_each(Vec::clear);
@@ -58,7 +58,7 @@ impl PerfusedOrganItem<'_, '_> {
     }
 }
 
-/// The vessel entity of each kind; of several of one kind, the first.
+/// The vessel entity of each kind; if several have one kind, the first.
 pub(crate) fn each_kind<'a>(
     entities: &'a [Entity],
     vessels: &'a Query<Perfused>,

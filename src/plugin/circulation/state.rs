@@ -20,15 +20,15 @@ use serde::{Deserialize, Serialize};
 
 /// The flow in an organ's vessels. The plugin drives it.
 ///
-/// Scenes and clones of the organ keep how far its open ends have clotted. All else is made anew.
+/// Scenes and clones of the organ keep how far its open ends have clotted. Everything else is made again.
 #[derive(Component, Debug, Default, Reflect, Serialize, Deserialize)]
 #[reflect(opaque, Component, Default, Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CirculationState {
-    /// The vessels that the flow is of, or will be when it is made.
+    /// The vessels of the present or coming flow.
     #[serde(skip)]
     pub(super) made_for: Option<MadeFor>,
-    /// With which settings.
+    /// The settings of this flow.
     #[serde(skip)]
     pub(super) made_with: Option<(Hydraulics, BleedingSettings)>,
     #[serde(skip)]
@@ -36,20 +36,20 @@ pub struct CirculationState {
     #[serde(skip)]
     pub(crate) flow: Option<OrganFlow>,
     pub(crate) bleeding: ByKind<Bleeding>,
-    /// Open ends in the order of the networks'.
+    /// Open ends, in the order of the networks.
     #[serde(skip)]
     pub(crate) ends: ByKind<Vec<FlowingEnd>>,
-    /// Whether the gaps have to be laid anew.
+    /// Whether the gaps have to be laid again.
     #[serde(skip)]
     pub(crate) is_unlaid: bool,
-    /// How the supply is measured, once the vessels have grown.
+    /// Measures the supply, once the vessels have grown.
     #[serde(skip)]
     pub(crate) gauge: Gauge,
     #[serde(skip)]
     pub(super) error: Option<FlowError>,
 }
 
-/// Which vessels a flow is of.
+/// The vessels of a flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct MadeFor {
     pub(super) lineages: ByKind<Lineage>,
@@ -57,7 +57,7 @@ pub(super) struct MadeFor {
     pub(super) is_grown: bool,
 }
 
-/// What scenes keep.
+/// A clone keeps what a scene keeps.
 impl Clone for CirculationState {
     fn clone(&self) -> Self {
         Self { bleeding: self.bleeding.clone().map(|_, bleeding| bleeding.resumed()), ..Self::default() }
@@ -65,19 +65,19 @@ impl Clone for CirculationState {
 }
 
 impl MadeFor {
-    /// Whether some of its vessels have given way to others.
+    /// Whether some of its vessels have been replaced.
     pub(super) fn is_replaced_by(&self, now: &Self) -> bool {
         VesselKind::ALL.into_iter().any(|kind| self.nodes[kind] > 0 && self.lineages[kind] != now.lineages[kind])
     }
 }
 
 impl CirculationState {
-    /// Whether blood flows: the vessels are there, and their network has been made.
+    /// Whether blood flows: the vessels exist, and their network has been made.
     pub fn flows(&self) -> bool {
         self.flow.is_some()
     }
 
-    /// How each open end of a kind of vessels bleeds, as of the last frame.
+    /// The bleeding of each open end of a kind of vessels, as of the last frame.
     pub fn bleeding(&self, kind: VesselKind) -> &Bleeding {
         &self.bleeding[kind]
     }
@@ -91,7 +91,7 @@ impl CirculationState {
         self.flow.as_ref()
     }
 
-    /// Takes over a new flow, with what the old one has laid.
+    /// Takes over a new flow, with the gaps of the old one.
     pub(super) fn take(&mut self, mut flow: OrganFlow, is_grown: bool) -> Result<(), FlowError> {
         if let Some(before) = &self.flow {
             flow.keep_gaps_of(before)?;

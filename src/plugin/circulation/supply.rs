@@ -1,7 +1,7 @@
 //! Circulate: which tissue still gets blood.
 //!
 //! In: the flow of an organ. Out: [`SegmentSupply`] on its vessel entities and [`OrganSupply`] on the organ, after each
-//! action and, while something bleeds, now and then. It is measured in jobs.
+//! action and, while something bleeds, at intervals. Jobs measure it.
 
 use crate::plugin::vessels::tree::Vessels;
 use crate::plugin::{
@@ -31,14 +31,14 @@ use bevy::{
     mesh::{Mesh, Mesh3d},
 };
 
-/// All that a measurement takes.
+/// All inputs of a measurement.
 struct Order {
     source: Source,
     condition: Condition,
     ischaemic_below: f32,
 }
 
-/// What is measured with: the first time, it is to be made from a copy of the flow and the organ's vertices.
+/// The gauge, or for the first measurement what it is made from: a copy of the flow and the organ's vertices.
 enum Source {
     Gauge(Box<SupplyGauge>),
     New { flow: Box<OrganFlow>, vertices: Vec<Vec3> },
@@ -71,7 +71,7 @@ pub(crate) struct Supplied {
     rest: Option<&'static RestMesh>,
 }
 
-/// Begins measurements that are due, and writes those that have ended.
+/// Starts measurements that are due, and writes those that are done.
 pub(crate) fn measure_supply(
     mut organs: Query<Supplied>,
     mut vessels: Query<(&Vessels, &mut SegmentSupply)>,
@@ -97,7 +97,7 @@ pub(crate) fn measure_supply(
 }
 
 impl SuppliedItem<'_, '_> {
-    /// Begins a measurement, if blood flows.
+    /// Starts a measurement, if blood flows.
     fn begin(&mut self, patient: &Patient, meshes: Option<&Assets<Mesh>>, jobs: &Jobs) {
         let state = self.state.bypass_change_detection();
         let gauge = state.gauge.begin(self.perfusion.ischaemic_below);
@@ -116,7 +116,7 @@ impl SuppliedItem<'_, '_> {
         self.state.bypass_change_detection().gauge.job = Some(jobs.start(work, |pace| order.carry_out(pace)));
     }
 
-    /// The organ's vertices, at rest where it is known how that is; none without a mesh that can be read.
+    /// The organ's vertices, at rest if the rest shape is known; none without a readable mesh.
     fn vertices(&self, meshes: Option<&Assets<Mesh>>) -> Vec<Vec3> {
         if let Some(rest) = self.rest.and_then(RestMesh::positions) {
             return rest.to_vec();
@@ -126,7 +126,7 @@ impl SuppliedItem<'_, '_> {
             .map_or_else(Vec::new, |positions| positions.iter().map(|&at| at.into()).collect())
     }
 
-    /// Nothing is known of vessels that grow.
+    /// Clears the supply of vessels that grow.
     fn clear(&mut self, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
         self.supply.set_if_neq(OrganSupply::default());
         let mut vessels = vessels.iter_many_mut(self.vessels.entities());

@@ -1,4 +1,4 @@
-//! What a growth follows: the wishes for an organ, its paint and its assets; and what a difference needs.
+//! The inputs of a growth (an organ's [`Vasculature`], paint and assets), and the work that a change of them needs.
 
 use crate::synthesis::{
     preset::Preset,
@@ -7,21 +7,21 @@ use crate::synthesis::{
 use bevy::{asset::AssetId, image::Image, mesh::Mesh};
 use std::sync::Arc;
 
-/// What must be done before an organ can grow on. What stands later includes what stands before.
+/// Work to do before an organ can grow on. Each variant includes those before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Need {
     /// Nothing.
     #[default]
     Nothing,
-    /// To lay other paint over the tissue, and to grow successors there.
+    /// Lay the new paint over the tissue, and grow successors there.
     Paint,
-    /// To start the growth again, on the same tissue.
+    /// Start the growth again, on the same tissue.
     Growth,
-    /// To prepare the tissue, then to start the growth.
+    /// Prepare the tissue, then start the growth.
     Tissue,
 }
 
-/// The assets that a tissue may be made of.
+/// The assets that a tissue may be made from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SourceAssets {
     pub(crate) mesh: Option<AssetId<Mesh>>,
@@ -29,13 +29,13 @@ pub(crate) struct SourceAssets {
 }
 
 impl SourceAssets {
-    /// Those that a source needs.
+    /// The assets that a source needs.
     fn needed_by(self, source: &TissueSource) -> Self {
         Self { mesh: self.mesh.filter(|_| source.needs_mesh()), image: self.image.filter(|_| source.image().is_some()) }
     }
 }
 
-/// What a growth follows, or is about to.
+/// The inputs that a growth follows, or is about to.
 #[derive(Clone, Debug)]
 pub(crate) struct Followed {
     /// The settings of the organ's [`Vasculature`](crate::plugin::Vasculature), without its seed.
@@ -46,7 +46,7 @@ pub(crate) struct Followed {
 }
 
 impl Followed {
-    /// What it needs to follow something else.
+    /// The work needed to follow other inputs.
     pub(crate) fn need(&self, settings: &Preset, seed: u64, paint: &TissuePaint, assets: SourceAssets) -> Need {
         let needed = |assets: SourceAssets| assets.needed_by(&settings.tissue);
         if self.settings.tissue != settings.tissue || needed(self.assets) != needed(assets) {
@@ -60,12 +60,12 @@ impl Followed {
         }
     }
 
-    /// Whether the tissue is made of this mesh asset.
+    /// Whether the tissue is made from this mesh asset.
     pub(crate) fn is_of_mesh(&self, mesh: AssetId<Mesh>) -> bool {
         self.assets.needed_by(&self.settings.tissue).mesh == Some(mesh)
     }
 
-    /// Whether the tissue is made of this image asset.
+    /// Whether the tissue is made from this image asset.
     pub(crate) fn is_of_image(&self, image: AssetId<Image>) -> bool {
         self.assets.needed_by(&self.settings.tissue).image == Some(image)
     }

@@ -1,4 +1,4 @@
-//! What makes an organ's vessels cuttable.
+//! The component that makes an organ's vessels cuttable.
 
 use crate::synthesis::wound::Retraction;
 use bevy::{
@@ -6,10 +6,10 @@ use bevy::{
     reflect::{Reflect, std_traits::ReflectDefault},
 };
 
-/// Lets an organ's vessels be cut, clamped and cauterised: put it beside the organ's
+/// Lets an organ's vessels be cut, clamped and cauterised. Put it beside the organ's
 /// [`Vasculature`](crate::plugin::Vasculature), or on an organ with vessels of your own.
 ///
-/// An organ without it pays nothing for it. Add a [`Perfusion`](crate::plugin::Perfusion), too, and open vessels bleed.
+/// An organ without it has no cost from it. With a [`Perfusion`](crate::plugin::Perfusion), too, open vessels bleed.
 /// Removing it makes the vessels whole again.
 ///
 /// ```
@@ -20,6 +20,6 @@ use bevy::{
 #[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct Cuttable {
-    /// How far the ends of later cuts draw back, so that a gap is seen.
+    /// How far the ends of later cuts retract, so that a gap is visible.
     pub retraction: Retraction,
 }

@@ -1,4 +1,4 @@
-//! Surgery: vessels are cut, clamped, tied and sealed, and healed again.
+//! Surgery: vessels are cut, clamped, tied, sealed, and healed again.
 
 use crate::plugin::{
     order::{self, VesselSystems},

@@ -1,9 +1,9 @@
-//! What is kept of vessels that are saved or cloned: all of a given tree, and of one that grew what tells it from others.
+//! The saved form of vessels, for files and clones: a given tree as a whole, and a hash of one that grew.
 
 use crate::synthesis::tree::{VesselKind, VesselTree};
 use serde::{Deserialize, Serialize};
 
-/// [`Vessels`](crate::plugin::Vessels) as they are written to a file.
+/// [`Vessels`](crate::plugin::Vessels) in a file.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Vessels", deny_unknown_fields)]
 pub(super) struct SavedVessels {

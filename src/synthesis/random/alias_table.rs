@@ -3,7 +3,7 @@
 
 /// A table over a list of weights.
 ///
-/// To draw: choose a slot evenly, then let [`pick`](Self::pick) stay with it or take the other one it holds.
+/// To draw, choose a slot uniformly. [`pick`](Self::pick) then stays with it or takes the slot's alternative.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AliasTable {
     picks: Vec<Pick>,
@@ -14,14 +14,14 @@ pub(crate) struct AliasTable {
 
 #[derive(Clone, Copy, Debug)]
 struct Pick {
-    /// Probability of staying with this slot.
+    /// Probability of keeping this slot.
     keep: f32,
     /// The slot to take otherwise.
     other: u32,
 }
 
 impl AliasTable {
-    /// The table of some weights, which are not below 0. It is empty where none is above 0.
+    /// The table of some weights, which are not below 0. It is empty if none is above 0.
     pub fn new(weights: impl ExactSizeIterator<Item = f64> + Clone) -> Self {
         let mut table = Self::default();
         table.rebuild(weights);
@@ -29,7 +29,7 @@ impl AliasTable {
         table
     }
 
-    /// Takes other weights, keeping memory.
+    /// Rebuilds the table for other weights, keeping its memory.
     pub fn rebuild(&mut self, weights: impl ExactSizeIterator<Item = f64> + Clone) {
         let Self { picks, shares, small, large } = self;
         picks.clear();
@@ -45,7 +45,7 @@ impl AliasTable {
         for (slot, &share) in shares.iter().enumerate() {
             if share < 1.0 { small.push(slot as u32) } else { large.push(slot as u32) }
         }
-        // Until it turns out otherwise a slot is its own, and one without weight is the heaviest one's.
+        // Initially a slot keeps itself, and a slot without weight gives the heaviest one.
         let heaviest = (0..shares.len()).fold(0, |best, slot| if shares[slot] > shares[best] { slot } else { best });
         let keep = |share: &f64| f32::from(u8::from(*share > 0.0));
         picks.extend(shares.iter().map(|share| Pick { keep: keep(share), other: heaviest as u32 }));
@@ -64,7 +64,7 @@ impl AliasTable {
         self.picks.len()
     }
 
-    /// What a slot gives, by an even number from 0 to below 1.
+    /// The result for a slot and a uniform number from 0 to below 1.
     #[inline]
     pub fn pick(&self, slot: u32, even: f32) -> u32 {
         let pick = self.picks[slot as usize];

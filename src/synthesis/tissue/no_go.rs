@@ -1,4 +1,4 @@
-//! No-go regions: where no vessel may be, such as over a landmark that is to stay free.
+//! No-go regions: where no vessel may be, such as over a landmark that must stay free.
 
 use crate::synthesis::{
     mesh::IndexedMesh,
@@ -11,7 +11,7 @@ use crate::synthesis::{
 use bevy_math::{Vec3, bounding::Aabb3d};
 use std::{fmt, sync::Arc};
 
-/// Share of a triangle's painted corners from which on a point of it is forbidden.
+/// Interpolated share of painted corners from which a point of a triangle is forbidden.
 const HALF: f32 = 0.5;
 
 /// A part of space in which no vessel may be. Its boundary belongs to it.
@@ -66,7 +66,7 @@ impl NoGoRegion {
     }
 }
 
-/// Where no vessel may be, at every point. A clone shares what the field was made of.
+/// Tells for every point whether vessels are forbidden. A clone shares its data.
 #[derive(Clone)]
 pub struct NoGoField(Vec<Part>);
 
@@ -82,17 +82,17 @@ enum Part {
 }
 
 impl NoGoField {
-    /// A field given by a function, for determinism's sake one that always says the same of the same point.
+    /// A field given by a function. For determinism, it must always give the same result for the same point.
     pub fn function(forbids: impl Fn(Vec3) -> bool + Send + Sync + 'static) -> Self {
         Self(vec![Part::Function(Arc::new(forbids))])
     }
 
-    /// A field painted on a mesh, one entry per vertex. Within a triangle, what is nearer to its painted corners is
-    /// forbidden: the side of the line on which the painted share is at least a half. Away from the mesh its nearest point
-    /// counts, so that what lies below painted surface is forbidden, too.
+    /// A field painted on a mesh, one entry per vertex. Within a triangle, points whose interpolated painted share is
+    /// at least a half are forbidden. Away from the mesh, its nearest point decides, so tissue below painted surface is
+    /// forbidden, too.
     ///
     /// # Errors
-    /// Entries that are not one per vertex.
+    /// A number of entries other than one per vertex.
     pub fn on_vertices(mesh: &IndexedMesh, painted: &[bool]) -> Result<Self, TissueError> {
         let expected = mesh.mesh().positions().len();
         if painted.len() != expected {
@@ -110,7 +110,7 @@ impl NoGoField {
         regions.into_iter().map(|region| region.check().map(Part::Region)).collect::<Result<_, _>>().map(Self)
     }
 
-    /// The field that forbids what either of two forbids.
+    /// The field that forbids all points that either of two forbids.
     #[must_use]
     pub fn or(mut self, other: Self) -> Self {
         self.0.extend(other.0);
@@ -145,8 +145,8 @@ impl fmt::Debug for Part {
 
 /// A tissue with no-go regions.
 ///
-/// Its shape stays what it is, and so does its extent; but no sample falls into the regions, and generators
-/// [place no node there](Tissue::no_go).
+/// Its shape and extent stay, but no sample falls into the regions, and generators [place no node
+/// there](Tissue::no_go).
 #[derive(Clone, Debug)]
 pub struct NoGoTissue {
     tissue: Arc<dyn Tissue>,
@@ -154,7 +154,7 @@ pub struct NoGoTissue {
 }
 
 impl NoGoTissue {
-    /// Lays a field over a tissue. What the tissue forbids already stays forbidden.
+    /// Lays a field over a tissue. Points that the tissue already forbids stay forbidden.
     ///
     /// # Errors
     /// A tissue that changes in stages: lay the field over its stages instead.

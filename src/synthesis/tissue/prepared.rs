@@ -1,4 +1,4 @@
-//! A tissue with everything that takes long to prepare, kept so that paint can be laid over it again and again.
+//! A tissue with all slow preparation done, so that paint can be laid over it any number of times.
 
 use super::{
     DensityField, DensityTissue, GuidePath, MeshSurface, MeshTissue, MeshVolume, NoGoField, NoGoTissue, Staged, Tissue,
@@ -10,21 +10,21 @@ use crate::synthesis::{
 };
 use std::sync::{Arc, OnceLock};
 
-/// A tissue made from its [source](super::TissueSource), before anything is painted on it. A clone shares all of it.
+/// A tissue made from its [source](super::TissueSource), without paint. A clone shares all of it.
 ///
 /// The indices, voxels and surfaces of an organ are made once. [`painted`](Self::painted) tissues share them.
 #[derive(Clone, Debug)]
 pub struct PreparedTissue {
-    /// Tissues that are in force before the last, each for a number of steps.
+    /// Tissues in force before the last, each for a number of steps.
     stages: Vec<(Arc<dyn Tissue>, u32)>,
     last: Arc<dyn Tissue>,
-    /// The tissue as it is without paint.
+    /// The tissue without paint.
     plain: Arc<dyn Tissue>,
-    /// What vertices are painted on; `None` for tissues that are not made of a mesh.
+    /// The mesh for paint on vertices; `None` for tissues that are not made from a mesh.
     canvas: Option<Arc<Canvas>>,
 }
 
-/// The mesh that vertices belong to, indexed when it is first painted on.
+/// A mesh that can be painted, indexed when it is first painted on.
 #[derive(Debug)]
 struct Canvas {
     mesh: Arc<TriangleMesh>,
@@ -32,7 +32,7 @@ struct Canvas {
 }
 
 impl Canvas {
-    /// Makes the index where it has yet to be made.
+    /// Makes the index if there is none yet.
     async fn index(&self, pace: &Pace) {
         if self.indexed.get().is_none() {
             let indexed = IndexedMesh::new_paced(Arc::clone(&self.mesh), pace).await;
@@ -46,10 +46,10 @@ impl Canvas {
 }
 
 impl PreparedTissue {
-    /// Any tissue but a mesh's: density and painted vertices have no place on it.
+    /// A tissue that is not made from a mesh: it takes no density and no painted vertices.
     ///
     /// # Errors
-    /// A tissue that changes in stages: paint is laid over each of them.
+    /// A tissue that changes in stages: paint its stages instead.
     pub fn new(tissue: Arc<dyn Tissue>) -> Result<Self, TissueError> {
         if tissue.stage(1).is_some() {
             return Err(TissueError::PaintOverStages);
@@ -60,7 +60,7 @@ impl PreparedTissue {
     /// The tissue of a mesh.
     ///
     /// # Errors
-    /// [`TissueError::Voxels`] and [`TissueError::NoInside`], where the inside is needed.
+    /// [`TissueError::Voxels`] and [`TissueError::NoInside`], if the inside is needed.
     pub(super) async fn of_mesh(
         mesh: Arc<TriangleMesh>,
         settings: &MeshTissue,
@@ -95,18 +95,19 @@ impl PreparedTissue {
         &self.plain
     }
 
-    /// The tissue with paint laid over it. Nothing that was prepared is prepared again. Where nothing is painted, this is
-    /// the [`tissue`](Self::tissue) itself.
+    /// The tissue with paint laid over it. Nothing is prepared again. With blank paint, this is the
+    /// [`tissue`](Self::tissue) itself.
     ///
-    /// The first time that vertices of a mesh are painted whose surface is no tissue, an index of its triangles is made.
+    /// If the mesh's surface is not part of the tissue, the first paint on its vertices makes an index of its
+    /// triangles.
     ///
     /// # Errors
-    /// What is wrong with the paint: see [`TissueError`].
+    /// Invalid paint: see [`TissueError`].
     pub fn painted(&self, paint: &TissuePaint) -> Result<Arc<dyn Tissue>, TissueError> {
         at_once(self.painted_paced(paint, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`painted`](Self::painted).
@@ -121,7 +122,7 @@ impl PreparedTissue {
         let density = paint.density.as_deref().map(density).transpose()?;
         let no_go = paint.no_go.field(|| self.canvas("a no-go region"))?;
         let laid = |tissue: &Arc<dyn Tissue>| guarded(thinned(Arc::clone(tissue), density.as_ref())?, no_go.as_ref());
-        // Guides lie on what vessels grow on first.
+        // Guides lie on the first stage.
         let base = self.stages.first().map_or(&self.last, |(first, _)| first);
         let mut stages = Vec::with_capacity(paint.guides.len() + self.stages.len());
         let pace = pace.part(0.5..1.0);
@@ -139,14 +140,14 @@ impl PreparedTissue {
         in_stages(stages, laid(&self.last)?)
     }
 
-    /// How much work it is to lay this paint over the tissue, in items: vertices, and triangles where their index has yet to
-    /// be made.
+    /// Work of laying this paint over the tissue, in items: vertices, and triangles if their index has still to be
+    /// made.
     pub fn painting_work(&self, paint: &TissuePaint) -> usize {
         let vertices = [paint.density.as_ref().map(Vec::len), paint.no_go.vertices.as_ref().map(Vec::len)];
         let painted = vertices.iter().flatten().sum::<usize>();
         let is_bare = |canvas: &&Arc<Canvas>| painted > 0 && canvas.indexed.get().is_none();
         let triangles = self.canvas.as_ref().filter(is_bare).map_or(0, |canvas| canvas.mesh.triangles().len());
-        // A value costs a small part of what an item of other work does.
+        // A value costs a small part of an item of other work.
         triangles + painted / 16
     }
 
