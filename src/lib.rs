@@ -68,9 +68,9 @@ pub mod render;
 pub mod prelude {
     pub use crate::VesselPlugin;
     pub use crate::plugin::{
-        Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, FollowsTetrahedra, GrowthAction, GrowthBudget,
-        GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, OrganPaint,
-        Perfusion, SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystems, Vessels,
+        Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, GrowthAction, GrowthBudget, GrowthCommand,
+        GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, OrganPaint, Perfusion,
+        SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystems, Vessels,
     };
     pub use crate::synthesis::colonization::ColonizationSettings;
     pub use crate::synthesis::generator::Generator;
@@ -140,3 +140,8 @@ impl Plugin for VesselPlugin {
         app.add_plugins(self.segments.clone());
     }
 }
+
+/// The code of the README, compiled.
+#[cfg(all(doctest, feature = "render"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -208,3 +208,12 @@ fn the_checks_find_what_no_file_may_hold() {
         assert_keeps(path, &"\n".repeat(MOST_LINES));
     }
 }
+
+#[test]
+fn the_prelude_has_thirty_names_at_most() {
+    let files = sources(&["src"]);
+    let crate_root = files.iter().find(|file| file.path == "src/lib.rs").expect("a crate root");
+    let names: Vec<&str> =
+        crate_root.uses.iter().filter(|import| import.is_public).map(|import| &*import.name).collect();
+    assert!((1..=30).contains(&names.len()), "{} names in the prelude: {names:?}", names.len());
+}
