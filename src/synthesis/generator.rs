@@ -148,7 +148,9 @@ pub trait GrowthMaker: fmt::Debug + Send + Sync {
     /// The spacing of roots for each kind of vessels that it grows. All lengths must be multiplied by `scale`.
     fn root_spacing(&self, scale: f32) -> ByKind<Option<RootSpacing>>;
 
-    /// Starts a growth, with all lengths multiplied by `scale`. [`Roots::resolve`] gives the places of roots.
+    /// Starts a growth, with all lengths multiplied by `scale`: 1, or the
+    /// [equivalent diameter](Extent::equivalent_diameter) of the tissue if the generator is [fitted](Generator::fit) to
+    /// it. [`Roots::resolve`] gives the places of roots.
     ///
     /// # Errors
     /// Why it cannot start, in words that name the value and the remedy.
