@@ -58,16 +58,20 @@ impl RayCast {
         }
     }
 
-    /// Whether the ray may meet a segment: quick to say, and right where it says no.
-    pub(crate) fn may_meet(&self, tree: &VesselTree, node: NodeId) -> bool {
+    /// Whether the ray may meet a segment nearer than what it has met: quick to say, and right where it says no. It asks
+    /// for the ball around the segment, and spares a caller from working out what is left of a segment far away.
+    ///
+    /// # Panics
+    /// When the node is not of the tree.
+    pub fn may_meet(&self, tree: &VesselTree, node: NodeId) -> bool {
         RoundCone::of(tree, node.0).is_some_and(|cone| {
             let (center, radius) = cone.ball_around();
             self.is_near(center, radius)
         })
     }
 
-    /// The same of anything within a ball.
-    pub(crate) fn may_meet_ball(&self, center: Vec3, radius: f32) -> bool {
+    /// The same of anything within a ball, in tissue lengths.
+    pub fn may_meet_ball(&self, center: Vec3, radius: f32) -> bool {
         self.is_near(center.as_dvec3(), f64::from(radius) * (1.0 + f64::from(f32::EPSILON)))
     }
 
