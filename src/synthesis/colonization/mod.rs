@@ -15,6 +15,7 @@ mod drains;
 mod forest;
 mod lengths;
 mod perception;
+mod report;
 pub mod seam;
 mod settings;
 mod step;
@@ -24,6 +25,7 @@ mod tests;
 mod vacancy;
 mod validity;
 
+pub use report::{StepReport, SystemReport};
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
 use crate::synthesis::parallel;
@@ -36,34 +38,6 @@ use std::sync::Arc;
 use step::Step;
 use system_growth::{Supplied, SystemGrowth};
 use vacancy::Vacancy;
-
-/// What one step did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StepReport {
-    /// Number of the step, from 1.
-    pub step: u32,
-    /// Candidates drawn from the tissue.
-    pub sampled: u32,
-    /// Candidates that became oxygen drains.
-    pub born: u32,
-    /// What the arteries did.
-    pub arterial: SystemReport,
-    /// What the veins did.
-    pub venous: SystemReport,
-}
-
-/// What one step did to one system.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SystemReport {
-    /// Nodes before the step: the first new node's index.
-    pub first_new_node: u32,
-    /// Nodes that were added.
-    pub new_nodes: u32,
-    /// Drains that were supplied and removed.
-    pub supplied: u32,
-    /// Drains that are left.
-    pub drains_left: u32,
-}
 
 /// Why growth could not start.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

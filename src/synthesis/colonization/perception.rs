@@ -1,8 +1,8 @@
 //! Who hears a drain: open nodes, their perception volumes, and the drains of each node.
 
+use super::drains::{Drains, Found, ON_THE_NODE, cos_at};
 use super::forest::Forest;
 use super::lengths::Lengths;
-use crate::synthesis::colonization::drains::{Drains, Found, ON_THE_NODE, cos_at};
 use crate::synthesis::parallel;
 use bevy_math::{Vec3, ops};
 

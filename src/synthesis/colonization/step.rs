@@ -1,9 +1,10 @@
 //! The parts of a step, in their order: candidates, arteries, veins.
 
 use super::candidates::{Candidates, Draws};
+use super::report::SystemReport;
+use super::settings::ColonizationSettings;
 use super::system_growth::{Ground, Supplied, SystemGrowth};
 use super::vacancy::Vacancy;
-use super::{ColonizationSettings, SystemReport};
 use crate::synthesis::tissue::{Extent, Tissue};
 use crate::synthesis::tree::BedLink;
 

@@ -1,12 +1,12 @@
 //! One growth step of one system: associate, grow, kill (Rauch & Harders 2021, section 3).
 
-use super::SystemReport;
 use super::direction::{Decision, decide};
+use super::drains::{Drains, News};
 use super::forest::Forest;
 use super::lengths::Lengths;
 use super::perception::{self, Pull, Search};
+use super::report::SystemReport;
 use super::settings::SystemSettings;
-use crate::synthesis::colonization::drains::{Drains, News};
 use crate::synthesis::parallel;
 use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::tissue::{NoGoField, Tissue, TissuePoint};

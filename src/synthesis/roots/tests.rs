@@ -1,7 +1,9 @@
 use super::*;
 use crate::synthesis::mesh::TriangleMesh;
-use crate::synthesis::tissue::{Ball, Cuboid, Disc, MeshSurface, Rectangle, TissueError};
-use bevy_math::Vec2;
+use crate::synthesis::random::Stream;
+use crate::synthesis::tissue::{Ball, Cuboid, Disc, MeshSurface, Rectangle, Tissue, TissueError, TissuePoint};
+use crate::synthesis::tree::{ByKind, VesselTree};
+use bevy_math::{Vec2, Vec3};
 
 /// Arteries and veins as space colonization grows them on a disc of diameter 1.
 const SPACING: ByKind<Option<RootSpacing>> = ByKind {

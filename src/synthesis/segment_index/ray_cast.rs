@@ -58,16 +58,20 @@ impl RayCast {
         }
     }
 
-    /// Whether the ray may meet a segment: a quick test without false negatives.
-    pub(crate) fn may_meet(&self, tree: &VesselTree, node: NodeId) -> bool {
+    /// Whether the ray may meet a segment nearer than its present hit: a quick test by the ball around the segment,
+    /// without false negatives.
+    ///
+    /// # Panics
+    /// If the node is not of the tree.
+    pub fn may_meet(&self, tree: &VesselTree, node: NodeId) -> bool {
         RoundCone::of(tree, node.0).is_some_and(|cone| {
             let (center, radius) = cone.ball_around();
             self.is_near(center, radius)
         })
     }
 
-    /// The same for anything within a ball.
-    pub(crate) fn may_meet_ball(&self, center: Vec3, radius: f32) -> bool {
+    /// The same for anything within a ball, in tissue lengths.
+    pub fn may_meet_ball(&self, center: Vec3, radius: f32) -> bool {
         self.is_near(center.as_dvec3(), f64::from(radius) * (1.0 + f64::from(f32::EPSILON)))
     }
 
