@@ -27,9 +27,6 @@ use bevy_math::Vec3;
 use surface::SurfaceBonds;
 use tetrahedra::SolidBonds;
 
-/// Fewest triangles, or fours of nodes, worth handing to another thread.
-const WORTH_SHARING: usize = 2048;
-
 /// Why nodes could not follow. Nothing has been moved then.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BindingError {

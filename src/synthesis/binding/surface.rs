@@ -1,9 +1,8 @@
 //! Nodes bound to triangles.
 
 use super::{
-    WORTH_SHARING,
     frames::{Frames, LANES, Vectors},
-    vertices::{Vertex, Vertices},
+    vertices::{Vertex, Vertices, WORTH_SHARING},
 };
 use crate::synthesis::{
     mesh::{TriangleIndex, TriangleMesh, doubled_normal, unit},

@@ -1,6 +1,5 @@
 //! Nodes bound to tetrahedra.
 
-use super::WORTH_SHARING;
 use crate::synthesis::{
     mesh::{TetMesh, tet_mesh::edges, triangle_index::closest_on_triangle},
     pace::{Pace, SHORT_STRETCH},
@@ -9,6 +8,9 @@ use crate::synthesis::{
 };
 use bevy_math::{DVec3, Vec3};
 use std::ops::Range;
+
+/// Fewest nodes worth handing to another thread.
+const WORTH_SHARING: usize = 2048;
 
 /// A point's weights for the last three corners of a tetrahedron; the four sum to 1.
 fn weights(point: Vec3, corners: [Vec3; 4]) -> DVec3 {

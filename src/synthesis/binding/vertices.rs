@@ -4,10 +4,12 @@
 //! triangles around a position, weighted by area, as in [`TriangleMesh::vertex_normals`]; here in f32 and gathered
 //! vertex by vertex, so that threads share the work and nothing depends on their number.
 
-use super::WORTH_SHARING;
 use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
 use crate::synthesis::{pace::Pace, parallel};
 use bevy_math::{Vec3, Vec3A};
+
+/// Fewest triangles, vertices, or fours of nodes, worth handing to another thread.
+pub(super) const WORTH_SHARING: usize = 2048;
 
 /// A vertex of a deformed organ. Position and normal lie side by side: a node asks for both, anywhere in the mesh.
 #[derive(Clone, Copy, Debug, Default)]

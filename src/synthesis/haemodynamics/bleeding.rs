@@ -7,8 +7,6 @@
 //! for the whole step: second order in the step, and the loss is the time integral of the reported flow exactly. A long
 //! step is made of shorter ones, so that a fast heart is followed and a simulator may skip minutes.
 
-#[cfg(feature = "serialize")]
-use crate::synthesis::haemodynamics::saved::SavedBleeding;
 use crate::synthesis::haemodynamics::{BloodVolume, Clotting};
 use crate::synthesis::haemodynamics::{Circulation, EndSide, FlowError, Network, NetworkEnd, RootPressure};
 use crate::synthesis::tree::NodeId;
@@ -139,8 +137,6 @@ pub struct BleedingChange {
 ///
 /// To undo, keep a clone: it holds a hundred bytes for each open end, and nothing of the tree.
 #[derive(Clone, Debug, Default)]
-#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serialize", serde(into = "SavedBleeding", try_from = "SavedBleeding"))]
 pub struct Bleeding {
     pub(super) settings: BleedingSettings,
     /// In the order of the network's open ends.

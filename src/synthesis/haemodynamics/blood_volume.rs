@@ -8,8 +8,6 @@
 //! 45 % are lost fast (Guyton & Hall, Textbook of Medical Physiology, chapter on circulatory shock). The parabola
 //! between is ours. Refilling from tissue takes hours and is left out.
 
-#[cfg(feature = "serialize")]
-use crate::synthesis::haemodynamics::saved::SavedBlood;
 use crate::synthesis::{haemodynamics::FlowError, units::Volume};
 
 /// Settings of a patient's blood.
@@ -79,8 +77,6 @@ impl Default for BloodVolumeSettings {
 
 /// The blood of one patient, which all bleeding organs share.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serialize", serde(into = "SavedBlood", try_from = "SavedBlood"))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct BloodVolume {
     settings: BloodVolumeSettings,

@@ -225,7 +225,8 @@ impl Circulation {
         let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
         veins.carry(arteries, *conductance, &arteries.pressures, &mut into_veins);
         veins.drive(venous, &into_veins, &pace.part(0.0..0.5)).await;
-        let pressures: Vec<f64> = veins.slots.iter().map(|&slot| venous.slots[slot as usize].pressure).collect();
+        let pressures: Vec<f64> =
+            veins.slots.iter().map(|&slot| venous.circuit.slots[slot as usize].pressure).collect();
         arteries.carry(veins, *conductance, &pressures, &mut into_arteries);
         arteries.drive(arterial, &into_arteries, &pace.part(0.5..1.0)).await;
     }

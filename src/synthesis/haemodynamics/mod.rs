@@ -40,9 +40,11 @@
 
 pub mod bleeding;
 pub mod blood_volume;
+mod circuit;
 pub mod clotting;
 mod error;
 mod exponential;
+mod gaps;
 mod interruption;
 pub mod ischaemia;
 mod joined;

@@ -1,23 +1,13 @@
 //! A tree as a network of resistances, kept up to date with the tree.
-//!
-//! The network has two slots more than the tree has nodes: slot 0 is the reference, held at the bed's pressure, from
-//! which pressures are counted; slot 1 is the source, held at the root pressure, and the parent of every root. So every
-//! slot has one above it, and no loop asks whether a node is a root or cut off.
 
-use super::{FlowError, FlowSettings, Interruption, open_ends::OpenEnds};
+use super::{
+    EndSide, FlowError, FlowSettings, Interruption, NetworkEnd,
+    circuit::{CLOSED, Circuit, FIRST, REFERENCE, SOURCE, Shunt, node_slot, slot_of},
+    open_ends::OpenEnds,
+};
 use crate::synthesis::pace::{Pace, at_once};
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use crate::synthesis::units::Pressure;
-
-/// Slot held at the bed's pressure. Also stands for "none" in lists of slots.
-pub(super) const REFERENCE: u32 = 0;
-/// Slot held at the root pressure.
-pub(super) const SOURCE: u32 = 1;
-/// Slots before that of node 0.
-pub(super) const FIRST: usize = 2;
-
-/// Resistance that lets nothing through. Far from the ends of `f64`, so that products with it stay finite.
-pub(super) const CLOSED: f64 = 1e200;
 
 /// Conductance of a bed that holds its terminal at its own pressure, in conductances of the terminal's segment. Large
 /// enough that 1 + HELD is HELD in `f64`: it makes no difference to infinity, and needs no case of its own.
@@ -29,48 +19,6 @@ const LEAK: f64 = 1e-11;
 
 /// Least length of a segment, in its radii. A segment of no length is a joint; this keeps its conductance finite.
 const LEAST_LENGTH: f64 = 1e-6;
-
-/// Where a slot stands in the tree.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Link {
-    /// The slot that the segment draws from: the parent, or the reference where the segment is interrupted.
-    pub upstream: u32,
-    /// The parent's slot, whether the segment is interrupted or not.
-    pub parent: u32,
-    /// Child of the highest index, or none.
-    pub first_child: u32,
-    /// The parent's next child in falling order of the index, or none.
-    pub next_sibling: u32,
-}
-
-/// A current Y·p − S that leaves a node of pressure p.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Shunt {
-    /// Conductance, in m³/(s·Pa).
-    pub y: f64,
-    /// Current at pressure 0 with its sign turned, in m³/s.
-    pub s: f64,
-}
-
-impl Shunt {
-    /// The same current, by pressures that count from one of `pressure`.
-    pub fn counted_from(self, pressure: f64) -> Self {
-        Self { y: self.y, s: self.s - self.y * pressure }
-    }
-}
-
-/// State of a segment and the node that it ends in.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Slot {
-    /// Resistance of the segment, in Pa·s/m³.
-    pub resistance: f64,
-    /// All that leaves the node downwards.
-    pub below: Shunt,
-    /// 1/(1 + R·Y): share of `below` that the segment passes on.
-    pub through: f64,
-    /// Pressure of the node above the bed's, in Pa, as of the last solution.
-    pub pressure: f64,
-}
 
 /// What [`Network::update`] found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -91,14 +39,9 @@ pub struct Network {
     pub(super) lengths: Vec<f64>,
     /// 8µ/(πr⁴) of every node's segment.
     pub(super) per_length: Vec<f64>,
-    pub(super) links: Vec<Link>,
-    pub(super) slots: Vec<Slot>,
-    /// The bed below each slot's node.
-    pub(super) beds: Vec<Shunt>,
+    pub(super) circuit: Circuit,
     /// Links that join each node to another network; empty where none is.
     pub(super) link_counts: Vec<u32>,
-    /// The bed, and the open ends as of the last solution.
-    pub(super) shunts: Vec<Shunt>,
     /// Root pressure above the bed's, in Pa.
     pub(super) source: f64,
     /// Pressure of the bed, in Pa.
@@ -138,11 +81,8 @@ impl Network {
             radii: Vec::new(),
             lengths: Vec::new(),
             per_length: Vec::new(),
-            links: Vec::new(),
-            slots: Vec::new(),
-            beds: Vec::new(),
+            circuit: Circuit::default(),
             link_counts: Vec::new(),
-            shunts: Vec::new(),
             interruptions: Vec::new(),
             ends: OpenEnds::default(),
             pressures: Vec::new(),
@@ -165,7 +105,7 @@ impl Network {
         tree.validate()?;
         let before = self.len();
         let goes_on = before <= tree.len()
-            && (0..before).all(|node| slot_of(tree.parents()[node]) == self.links[node + FIRST].parent);
+            && (0..before).all(|node| slot_of(tree.parents()[node]) == self.circuit.links[node + FIRST].parent);
         if !goes_on {
             self.clear();
             at_once(self.append(tree, &Pace::default()));
@@ -202,14 +142,7 @@ impl Network {
         self.interruptions.clear();
         self.ends.clear();
         self.link_counts.clear();
-        self.links.clear();
-        self.links.resize(FIRST, Link::default());
-        self.slots.clear();
-        self.slots.resize(FIRST, Slot::default());
-        for shunts in [&mut self.beds, &mut self.shunts] {
-            shunts.clear();
-            shunts.resize(FIRST, Shunt::default());
-        }
+        self.circuit.clear();
     }
 
     /// Takes over the nodes that the tree has more.
@@ -217,12 +150,7 @@ impl Network {
         let before = self.len();
         let add = |number: usize| {
             let node = before + number;
-            let (slot, parent) = (node + FIRST, slot_of(tree.parents()[node]));
-            let next_sibling = std::mem::replace(&mut self.links[parent as usize].first_child, slot as u32);
-            self.links.push(Link { upstream: parent, parent, first_child: REFERENCE, next_sibling });
-            self.slots.push(Slot::default());
-            self.beds.push(Shunt::default());
-            self.shunts.push(Shunt::default());
+            self.circuit.push(slot_of(tree.parents()[node]));
             self.radii.push(0.0);
             self.per_length.push(0.0);
             let length = self.length_in(tree, node);
@@ -234,7 +162,7 @@ impl Network {
         let measure = |number: usize| {
             let node = before + number;
             self.set_resistance(node);
-            if let Some(parent) = (self.links[node + FIRST].parent as usize).checked_sub(FIRST) {
+            if let Some(parent) = (self.circuit.links[node + FIRST].parent as usize).checked_sub(FIRST) {
                 self.set_bed(parent);
             }
         };
@@ -263,7 +191,7 @@ impl Network {
 
     /// Resistance of a node's segment while it is whole, in Pa·s/m³; 0 for a root.
     pub(super) fn whole_resistance(&self, node: usize) -> f64 {
-        if self.links[node + FIRST].parent == SOURCE {
+        if self.circuit.links[node + FIRST].parent == SOURCE {
             return 0.0;
         }
         let least = LEAST_LENGTH * self.settings.scale.to_metres(self.radii[node]);
@@ -272,15 +200,15 @@ impl Network {
     }
 
     fn set_resistance(&mut self, node: usize) {
-        let is_whole = self.links[node + FIRST].upstream != REFERENCE;
-        self.slots[node + FIRST].resistance = if is_whole { self.whole_resistance(node) } else { CLOSED };
+        let is_whole = self.circuit.links[node + FIRST].upstream != REFERENCE;
+        self.circuit.slots[node + FIRST].resistance = if is_whole { self.whole_resistance(node) } else { CLOSED };
         self.set_bed(node);
     }
 
     /// What a node drains into: its links, or the pool if it is a terminal without any. A root without children is no
     /// terminal.
     pub(super) fn set_bed(&mut self, node: usize) {
-        let link = self.links[node + FIRST];
+        let link = self.circuit.links[node + FIRST];
         let is_terminal = link.first_child == REFERENCE && link.parent != SOURCE;
         let links = self.link_counts.get(node).copied().unwrap_or(0);
         let y = match self.settings.bed.resistance {
@@ -291,8 +219,35 @@ impl Network {
             Some(resistance) => 1.0 / resistance.pascal_seconds_per_cubic_metre(),
             None => HELD / self.whole_resistance(node),
         };
-        self.beds[node + FIRST] = Shunt { y, s: 0.0 };
-        self.shunts[node + FIRST] = self.beds[node + FIRST];
+        self.circuit.beds[node + FIRST] = Shunt { y, s: 0.0 };
+        self.circuit.shunts[node + FIRST] = self.circuit.beds[node + FIRST];
+    }
+
+    /// Measures all ends again, after segments changed.
+    pub(super) fn measure_ends(&mut self) {
+        for index in 0..self.ends.all().len() {
+            self.measure_end(index);
+        }
+        self.ends.is_untraced = true;
+    }
+
+    /// Measures the ends of one segment.
+    pub(super) fn measure_ends_of(&mut self, node: NodeId) {
+        for index in self.ends.indices_of(node) {
+            self.measure_end(index);
+        }
+    }
+
+    fn measure_end(&mut self, index: usize) {
+        let NetworkEnd { node, side, along, .. } = self.ends.all()[index];
+        let whole = self.whole_resistance(node.index());
+        let slot = node_slot(node.index());
+        let (attached, share) = match side {
+            EndSide::Proximal => (self.circuit.links[slot].parent, along),
+            EndSide::Distal => (slot as u32, 1.0 - along),
+        };
+        let discharge = f64::from(self.settings.discharge_coefficient);
+        self.ends.all_mut()[index].measure(attached, whole * f64::from(share), self.settings.scale, discharge);
     }
 
     /// Number of nodes.
@@ -343,18 +298,13 @@ impl Network {
         Pressure::from_pascals(self.source + self.bed)
     }
 
+    /// Pressure outside above the bed's.
+    pub(super) fn ambient(&self) -> f64 {
+        self.settings.ambient.pascals() - self.bed
+    }
+
     /// Checks that a node is there.
     pub(super) fn check(&self, node: NodeId) -> Result<(), FlowError> {
         if node.index() < self.len() { Ok(()) } else { Err(FlowError::NoSuchNode { node: node.0, nodes: self.len() }) }
     }
-}
-
-/// Slot of a node, or of the source for a root's missing parent.
-fn slot_of(node: u32) -> u32 {
-    if node == NO_PARENT { SOURCE } else { node + FIRST as u32 }
-}
-
-/// Slot of a node.
-pub(super) fn node_slot(node: usize) -> usize {
-    node + FIRST
 }

@@ -1,8 +1,8 @@
 //! Open ends, and how much they let out.
 
 use super::{
-    FlowError, Network, Outlet,
-    network::{Shunt, node_slot},
+    FlowError, Outlet,
+    circuit::{Circuit, Shunt},
     skeleton::Skeleton,
 };
 use crate::synthesis::pace::{Pace, at_once};
@@ -97,13 +97,20 @@ impl NetworkEnd {
     }
 
     /// Sets what follows from the segment and the hole.
-    fn measure(&mut self, attached: u32, piece: f64, scale: Scale, discharge: f64) {
+    pub(super) fn measure(&mut self, attached: u32, piece: f64, scale: Scale, discharge: f64) {
         let radius = scale.to_metres(self.outlet.radius);
         self.area = std::f64::consts::PI * radius * radius;
         let passing = discharge * self.area;
         self.orifice = BLOOD_DENSITY / (2.0 * passing * passing);
         self.attached = attached;
         self.piece = piece;
+    }
+
+    /// Adds what it draws to the shunt of its node.
+    fn draw_from(&self, circuit: &mut Circuit) {
+        let shunt = &mut circuit.shunts[self.attached as usize];
+        shunt.y += self.stump.y;
+        shunt.s += self.stump.s;
     }
 
     /// K of what is open of the hole.
@@ -126,7 +133,7 @@ impl NetworkEnd {
 pub(super) struct OpenEnds {
     /// In the order of the node, proximal before distal.
     list: Vec<NetworkEnd>,
-    pub skeleton: Skeleton,
+    skeleton: Skeleton,
     /// Whether the skeleton has to be traced again.
     pub is_untraced: bool,
     /// Whether flows have to be solved for again.
@@ -150,6 +157,10 @@ impl OpenEnds {
         &self.list
     }
 
+    pub fn all_mut(&mut self) -> &mut [NetworkEnd] {
+        &mut self.list
+    }
+
     pub fn clear(&mut self) {
         self.list.clear();
         self.is_untraced = true;
@@ -171,7 +182,7 @@ impl OpenEnds {
     }
 
     /// Where the ends of a segment are in the list.
-    fn indices_of(&self, node: NodeId) -> Range<usize> {
+    pub fn indices_of(&self, node: NodeId) -> Range<usize> {
         self.list.partition_point(|end| end.node < node)..self.list.partition_point(|end| end.node <= node)
     }
 
@@ -197,6 +208,19 @@ impl OpenEnds {
     pub fn set_opening(&mut self, index: usize, share: f64) {
         self.is_unsolved |= self.list[index].opening.to_bits() != share.to_bits();
         self.list[index].opening = share;
+    }
+
+    /// Traces the skeleton again where that is due. The circuit's sums must be right.
+    pub fn trace(&mut self, circuit: &Circuit) {
+        if !std::mem::take(&mut self.is_untraced) {
+            return;
+        }
+        let attached = self.list.iter().map(|end| end.attached);
+        at_once(self.skeleton.trace(circuit, attached, &Pace::default()));
+        for end in &mut self.list {
+            end.joint = self.skeleton.joint_at(end.attached);
+        }
+        self.is_unsolved = true;
     }
 
     /// Finds the flows of all ends at once.
@@ -310,84 +334,36 @@ impl OpenEnds {
             end.pressure = ambient + difference - end.piece * end.flow + bed;
         }
     }
-}
 
-impl Network {
-    /// Measures all ends again, after segments changed.
-    pub(super) fn measure_ends(&mut self) {
-        for index in 0..self.ends.list.len() {
-            self.measure_end(index);
-        }
-        self.ends.is_untraced = true;
-    }
-
-    /// Measures the ends of one segment.
-    pub(super) fn measure_ends_of(&mut self, node: NodeId) {
-        for index in self.ends.indices_of(node) {
-            self.measure_end(index);
-        }
-    }
-
-    fn measure_end(&mut self, index: usize) {
-        let NetworkEnd { node, side, along, .. } = self.ends.list[index];
-        let whole = self.whole_resistance(node.index());
-        let slot = node_slot(node.index());
-        let (attached, share) = match side {
-            EndSide::Proximal => (self.links[slot].parent, along),
-            EndSide::Distal => (slot as u32, 1.0 - along),
-        };
-        let discharge = f64::from(self.settings.discharge_coefficient);
-        self.ends.list[index].measure(attached, whole * f64::from(share), self.settings.scale, discharge);
-    }
-
-    /// Traces the skeleton again where that is due.
-    pub(super) fn trace_ends(&mut self) {
-        if !std::mem::take(&mut self.ends.is_untraced) {
+    /// Puts the flows into the sums of the circuit, where that is due.
+    pub fn add_to_sums(&mut self, circuit: &mut Circuit) {
+        if !std::mem::take(&mut self.is_unloaded) {
             return;
         }
-        let mut skeleton = std::mem::take(&mut self.ends.skeleton);
-        let attached = self.ends.list.iter().map(|end| end.attached);
-        at_once(skeleton.trace(self, attached, &Pace::default()));
-        self.ends.skeleton = skeleton;
-        for end in &mut self.ends.list {
-            end.joint = self.ends.skeleton.joint_at(end.attached);
-        }
-        self.ends.is_unsolved = true;
-    }
-
-    /// Puts the flows of the open ends into the network's sums.
-    pub(super) fn load_ends(&mut self) {
-        if !std::mem::take(&mut self.ends.is_unloaded) {
-            return;
-        }
-        self.load_stumps();
-        for at in 0..self.ends.skeleton.active().len() {
-            self.sum_at(self.ends.skeleton.active()[at]);
+        self.load(circuit);
+        for &slot in self.skeleton.active() {
+            circuit.sum_at(slot);
         }
     }
 
-    /// Puts what the open ends draw into the shunts of their nodes.
-    pub(super) fn load_stumps(&mut self) {
-        for end in &self.ends.list {
-            self.shunts[end.attached as usize] = self.beds[end.attached as usize];
+    /// Puts what the ends draw into the shunts of their nodes.
+    pub fn load(&self, circuit: &mut Circuit) {
+        for end in &self.list {
+            circuit.shunts[end.attached as usize] = circuit.beds[end.attached as usize];
         }
-        for end in &self.ends.list {
-            let shunt = &mut self.shunts[end.attached as usize];
-            shunt.y += end.stump.y;
-            shunt.s += end.stump.s;
+        for end in &self.list {
+            end.draw_from(circuit);
         }
     }
 
-    /// Puts into the shunts of some slots, which rise, what leaves their nodes and is no child: the bed, and the open ends
-    /// as of the last solution.
-    pub(super) fn load_shunts(&mut self, slots: &[u32]) {
+    /// Puts into the shunts of some slots, which rise, what leaves their nodes and is no child: the bed, and the ends as of
+    /// the last solution.
+    pub fn load_at(&self, slots: &[u32], circuit: &mut Circuit) {
         for &slot in slots {
-            self.shunts[slot as usize] = self.beds[slot as usize];
+            circuit.shunts[slot as usize] = circuit.beds[slot as usize];
         }
-        for end in self.ends.list.iter().filter(|end| slots.binary_search(&end.attached).is_ok()) {
-            let shunt = &mut self.shunts[end.attached as usize];
-            shunt.y += end.stump.y;
-            shunt.s += end.stump.s;
+        for end in self.list.iter().filter(|end| slots.binary_search(&end.attached).is_ok()) {
+            end.draw_from(circuit);
         }
     }
 }

@@ -31,9 +31,9 @@ pub(super) struct Quotient {
 impl Quotient {
     /// Traces the tree again, after it changed or was cut, or other nodes were linked.
     pub async fn trace(&mut self, network: &mut Network, linked: &[u32], pace: &Pace) {
-        network.sum_all(&pace.part(0.0..0.5)).await;
+        network.circuit.sum_all(&pace.part(0.0..0.5)).await;
         let ends = network.ends.all().iter().map(|end| end.attached);
-        self.skeleton.trace(network, linked.iter().copied().chain(ends), &pace.part(0.5..1.0)).await;
+        self.skeleton.trace(&network.circuit, linked.iter().copied().chain(ends), &pace.part(0.5..1.0)).await;
     }
 
     /// The joint of a slot that is linked, or that an end is attached to.

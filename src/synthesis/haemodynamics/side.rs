@@ -2,7 +2,7 @@
 
 use super::{
     Network,
-    network::{SOURCE, node_slot},
+    circuit::{SOURCE, node_slot},
     quotient::Quotient,
 };
 use crate::synthesis::{pace::Pace, tree::NodeId};
@@ -41,7 +41,7 @@ impl Side {
             self.traced = Some(network.revision);
         }
         self.pressures.clear();
-        self.pressures.extend(self.slots.iter().map(|&slot| network.slots[slot as usize].pressure));
+        self.pressures.extend(self.slots.iter().map(|&slot| network.circuit.slots[slot as usize].pressure));
     }
 
     /// Pressures at the linked nodes that currents into them cause, all else being at pressure 0: T⁻¹.
@@ -85,7 +85,7 @@ impl Side {
     /// Forgets what links bring to roots, whose pressure is given: there is nothing to balance.
     pub fn excuse_roots(&self, network: &Network, currents: &mut [f64]) {
         for (current, &slot) in currents.iter_mut().zip(&self.slots) {
-            if network.links[slot as usize].upstream == SOURCE {
+            if network.circuit.links[slot as usize].upstream == SOURCE {
                 *current = 0.0;
             }
         }
@@ -94,11 +94,11 @@ impl Side {
     /// Sets what the links bring, and solves the network with its ends as they are loaded.
     pub async fn drive(&self, network: &mut Network, currents: &[f64], pace: &Pace) {
         for (&slot, &current) in self.slots.iter().zip(currents) {
-            network.beds[slot as usize].s = current;
-            network.shunts[slot as usize] = network.beds[slot as usize];
+            network.circuit.beds[slot as usize].s = current;
+            network.circuit.shunts[slot as usize] = network.circuit.beds[slot as usize];
         }
-        network.load_stumps();
-        network.sum_all(&pace.part(0.0..0.5)).await;
+        network.ends.load(&mut network.circuit);
+        network.circuit.sum_all(&pace.part(0.0..0.5)).await;
         network.spread_pressures(&pace.part(0.5..1.0)).await;
         // What changes from here on makes a later solution of this network alone begin anew.
         network.sums_stale = true;
@@ -123,11 +123,6 @@ impl Network {
         self.sums_stale = true;
         self.revision += 1;
         self.ends.is_untraced = true;
-    }
-
-    /// Pressure outside above the bed's.
-    pub(super) fn ambient(&self) -> f64 {
-        self.settings.ambient.pascals() - self.bed
     }
 
     /// What the ends draw by their tangents, by pressures above the bed's.

@@ -5,10 +5,7 @@
 //! its ends: eliminating the nodes between, one by one, turns a star of three into a triangle. All of it adds, multiplies
 //! and divides positive numbers. So m ends make at most 2m joints, however large the tree.
 
-use super::{
-    Network,
-    network::{REFERENCE, SOURCE, Shunt},
-};
+use super::circuit::{Circuit, REFERENCE, SOURCE, Shunt};
 use crate::synthesis::pace::{Pace, Stretch};
 
 /// No joint.
@@ -78,12 +75,12 @@ impl Skeleton {
     const DUE: u32 = u32::MAX - 1;
 
     /// Traces the paths from the slots that ends are attached to. The sums of all slots off the paths must be right.
-    pub async fn trace(&mut self, network: &Network, attached: impl Iterator<Item = u32>, pace: &Pace) {
-        self.begin_trace(network.links.len());
+    pub async fn trace(&mut self, circuit: &Circuit, attached: impl Iterator<Item = u32>, pace: &Pace) {
+        self.begin_trace(circuit.links.len());
         let (mut walks, mut stretch) = (Vec::new(), Stretch::default());
         for slot in attached {
             walks.push(self.active.len());
-            self.walk(network, slot);
+            self.walk(circuit, slot);
             if stretch.ends_after(self.active.len() - walks[walks.len() - 1]) {
                 pace.rest(0.0).await;
             }
@@ -100,7 +97,7 @@ impl Skeleton {
             let slot = self.active[at];
             if self.joint_of[slot as usize] == Self::DUE {
                 self.joint_of[slot as usize] = self.joints.len() as u32;
-                let joint = self.joint(network, slot);
+                let joint = self.joint(circuit, slot);
                 self.joints.push(joint);
             }
             if stretch.ends_after(1) {
@@ -125,12 +122,12 @@ impl Skeleton {
     }
 
     /// Marks the path from a slot up to its root, or to where it meets one that is marked.
-    fn walk(&mut self, network: &Network, start: u32) {
+    fn walk(&mut self, circuit: &Circuit, start: u32) {
         let mut slot = start;
         while self.seen[slot as usize] != self.trace {
             self.seen[slot as usize] = self.trace;
             self.active.push(slot);
-            let upstream = network.links[slot as usize].upstream;
+            let upstream = circuit.links[slot as usize].upstream;
             let begins = upstream <= SOURCE;
             self.joint_of[slot as usize] = if slot == start || begins { Self::DUE } else { NONE };
             if begins {
@@ -142,12 +139,12 @@ impl Skeleton {
     }
 
     /// Measures what hangs off a joint, and the run above it. Its `above` is a slot for now.
-    fn joint(&self, network: &Network, slot: u32) -> Joint {
-        let mut upper = network.links[slot as usize].upstream;
+    fn joint(&self, circuit: &Circuit, slot: u32) -> Joint {
+        let mut upper = circuit.links[slot as usize].upstream;
         let mut joint = Joint {
             above: NONE,
             is_root: upper == SOURCE,
-            hanging: self.hanging(network, slot),
+            hanging: self.hanging(circuit, slot),
             run: Run::default(),
             below: Shunt::default(),
             pressure: 0.0,
@@ -155,10 +152,10 @@ impl Skeleton {
         if upper <= SOURCE {
             return joint;
         }
-        joint.run.through = 1.0 / network.slots[slot as usize].resistance;
+        joint.run.through = 1.0 / circuit.slots[slot as usize].resistance;
         while self.joint_of[upper as usize] == NONE {
-            joint.run.extend(self.hanging(network, upper), network.slots[upper as usize].resistance);
-            upper = network.links[upper as usize].upstream;
+            joint.run.extend(self.hanging(circuit, upper), circuit.slots[upper as usize].resistance);
+            upper = circuit.links[upper as usize].upstream;
         }
         joint.above = upper;
         // A run that leaks all it carries still joins its ends, so that no division is by 0.
@@ -167,13 +164,13 @@ impl Skeleton {
     }
 
     /// Bed, links and the children that are on no path.
-    fn hanging(&self, network: &Network, slot: u32) -> Shunt {
-        let mut hanging = network.beds[slot as usize];
-        let mut child = network.links[slot as usize].first_child;
+    fn hanging(&self, circuit: &Circuit, slot: u32) -> Shunt {
+        let mut hanging = circuit.beds[slot as usize];
+        let mut child = circuit.links[slot as usize].first_child;
         while child != REFERENCE {
-            let link = network.links[child as usize];
+            let link = circuit.links[child as usize];
             if link.upstream == slot && self.seen[child as usize] != self.trace {
-                let below = &network.slots[child as usize];
+                let below = &circuit.slots[child as usize];
                 hanging.y += below.below.y * below.through;
                 hanging.s += below.below.s * below.through;
             }

@@ -2,7 +2,7 @@
 
 use super::{
     Network, NetworkEnd,
-    network::{FIRST, REFERENCE, SOURCE},
+    circuit::{FIRST, REFERENCE, SOURCE},
 };
 use crate::synthesis::units::Flow;
 
@@ -29,8 +29,8 @@ impl Network {
     /// # Panics
     /// When the node is not of this network.
     pub fn bed_flow(&self, node: usize) -> f64 {
-        let bed = self.beds[node + FIRST];
-        bed.y * self.slots[node + FIRST].pressure - bed.s
+        let bed = self.circuit.beds[node + FIRST];
+        bed.y * self.circuit.slots[node + FIRST].pressure - bed.s
     }
 
     /// Resistance of a node's segment while it is whole, in Pa·s/m³; 0 for a root.
@@ -78,11 +78,11 @@ impl Network {
     /// Flow through all roots together, as of the last [`settle`](Self::settle) or [`solve`](Self::solve).
     pub fn inflow(&self) -> Flow {
         let mut sum = 0.0;
-        let mut root = self.links[SOURCE as usize].first_child;
+        let mut root = self.circuit.links[SOURCE as usize].first_child;
         while root != REFERENCE {
-            let below = self.slots[root as usize].below;
+            let below = self.circuit.slots[root as usize].below;
             sum += below.y * self.source - below.s;
-            root = self.links[root as usize].next_sibling;
+            root = self.circuit.links[root as usize].next_sibling;
         }
         Flow::from_cubic_metres_per_second(sum)
     }

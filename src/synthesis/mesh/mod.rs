@@ -4,12 +4,14 @@
 //! work with, its [`topology`], an index of its triangles ([`TriangleIndex`]) and its voxels.
 
 pub(crate) mod bit_grid;
+pub(crate) mod crossing;
 mod indexed;
 mod shaded;
 pub(crate) mod tet_mesh;
 pub mod topology;
 pub mod triangle_index;
 mod triangle_mesh;
+mod vertex_normals;
 pub(crate) mod voxels;
 mod welding;
 pub(crate) mod winding;

@@ -1,7 +1,7 @@
 //! Making the triangles of a mesh face the way that winding numbers need.
 
 use crate::synthesis::{
-    mesh::{TriangleIndex, TriangleMesh, tetrahedron_volume, topology::Patches, voxels::crossing},
+    mesh::{TriangleIndex, TriangleMesh, crossing::crossing, tetrahedron_volume, topology::Patches},
     pace::Pace,
     space::bvh::Bounds,
 };

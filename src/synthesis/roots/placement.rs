@@ -12,20 +12,24 @@ pub enum RootPlacement {
     /// No root: vessels of this kind don't grow, unless from a given tree.
     #[default]
     None,
-    /// This many roots, spread over the tissue, chosen by the seed. The first is where the tissue has an
-    /// [entrance](Tissue::entrance), if it has one.
+    /// This many roots, spread over the tissue, chosen by the seed. The first is where the tissue has an [entrance], if it
+    /// has one.
     ///
     /// Limits: at most [`Roots::MAX_SPREAD`].
+    ///
+    /// [entrance]: crate::synthesis::tissue::Tissue::entrance
     Spread(u32),
-    /// As many roots as it takes for all tissue to be within this many [equivalent diameters](crate::synthesis::tissue::Extent::equivalent_diameter)
-    /// of one, measured along the tissue, chosen by the seed. A tissue with an [entrance](Tissue::entrance) has its only
-    /// root there.
+    /// As many roots as it takes for all tissue to be within this many [equivalent diameters] of one, measured along the
+    /// tissue, chosen by the seed. A tissue with an [entrance] has its only root there.
     ///
     /// Higher values give fewer roots, whose vessels have further to go. Step length, number of steps and growth of the
     /// tissue decide how far a vessel comes: about 0.7 times as far as a straight one on a surface, 0.55 times in a volume.
     /// A tissue of stages is measured in its first stage, in diameters of its last, to which lengths are fitted.
     ///
     /// Limits: at least [`Roots::LEAST_REACH`]. Usual: [`Roots::DEFAULT_REACH`].
+    ///
+    /// [equivalent diameters]: crate::synthesis::tissue::Extent::equivalent_diameter
+    /// [entrance]: crate::synthesis::tissue::Tissue::entrance
     Within(f32),
     /// One root beside each root of the [companion](VesselKind::companion), a step length away, in a direction chosen by the
     /// seed. Roots of the companion's given tree count too.

@@ -1,9 +1,6 @@
 //! A tissue with all slow preparation done, so that paint can be laid over it any number of times.
 
-use super::{
-    DensityField, DensityTissue, GuidePath, MeshSurface, MeshTissue, MeshVolume, NoGoField, NoGoTissue, Staged, Tissue,
-    TissueError, TissueMode, TissuePaint,
-};
+use super::{DensityField, DensityTissue, GuidePath, NoGoField, NoGoTissue, Staged, Tissue, TissueError, TissuePaint};
 use crate::synthesis::{
     mesh::{IndexedMesh, TriangleMesh},
     pace::{Pace, at_once},
@@ -57,35 +54,17 @@ impl PreparedTissue {
         Ok(Self { stages: Vec::new(), last: Arc::clone(&tissue), plain: tissue, canvas: None })
     }
 
-    /// The tissue of a mesh.
+    /// The tissues of a mesh: stages, each for a number of steps, and the last. `indexed` is empty where none of them needs an
+    /// index of the triangles.
     ///
     /// # Errors
-    /// [`TissueError::Voxels`] and [`TissueError::NoInside`], if the inside is needed.
-    pub(super) async fn of_mesh(
+    /// Tissues that make up no [`Staged`] one.
+    pub(super) fn of_mesh(
         mesh: Arc<TriangleMesh>,
-        settings: &MeshTissue,
-        pace: &Pace,
+        indexed: OnceLock<IndexedMesh>,
+        stages: Vec<(Arc<dyn Tissue>, u32)>,
+        last: Arc<dyn Tissue>,
     ) -> Result<Self, TissueError> {
-        let indexed = OnceLock::new();
-        let surface = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
-            let surface = MeshSurface::new_paced(Arc::clone(&mesh), &pace).await?;
-            indexed.get_or_init(|| surface.indexed().clone());
-            let surface: Arc<dyn Tissue> = Arc::new(surface);
-            Ok(surface)
-        };
-        let volume = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
-            let volume: Arc<dyn Tissue> = Arc::new(MeshVolume::new_paced(&mesh, settings.resolution, &pace).await?);
-            Ok(volume)
-        };
-        let (stages, last) = match settings.mode {
-            TissueMode::Surface => (Vec::new(), surface(pace.clone()).await?),
-            TissueMode::Volume => (Vec::new(), volume(pace.clone()).await?),
-            TissueMode::Staged { surface_steps } => {
-                let first = surface(pace.part(0.0..0.2)).await?;
-                (vec![(first, surface_steps)], volume(pace.part(0.2..1.0)).await?)
-            }
-        };
-        pace.rest(1.0).await;
         let plain = in_stages(stages.clone(), Arc::clone(&last))?;
         Ok(Self { stages, last, plain, canvas: Some(Arc::new(Canvas { mesh, indexed })) })
     }

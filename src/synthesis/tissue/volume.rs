@@ -12,7 +12,8 @@ use crate::synthesis::{
     mesh::{
         TriangleIndex, TriangleMesh,
         bit_grid::BitGrid,
-        voxels::{Finding, Grid, MAJORITY, crossing},
+        crossing::crossing,
+        voxels::{Finding, Grid, MAJORITY},
         winding::oriented,
     },
     pace::{Pace, SHORT_STRETCH, at_once},

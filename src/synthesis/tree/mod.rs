@@ -6,6 +6,7 @@
 use bevy_math::Vec3;
 
 mod bed_links;
+mod error;
 mod hash;
 mod kind;
 pub mod murray;
@@ -15,11 +16,11 @@ pub mod sweep;
 pub mod validate;
 
 pub use bed_links::BedLink;
+pub use error::TreeError;
 pub use hash::hash_trees;
 pub use kind::{ByKind, VesselKind};
 pub use place::Place;
 pub use statistics::TreeStatistics;
-pub use validate::TreeError;
 
 /// A node of a [`VesselTree`], and the segment that ends in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -43,9 +43,11 @@
 //! # }
 //! ```
 
+mod actions;
 mod blade;
 mod crossing;
 mod error;
+mod history;
 mod injury;
 mod ledger;
 mod pieces;

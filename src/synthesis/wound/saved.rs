@@ -5,12 +5,13 @@ use crate::synthesis::wound::{
     injury::{ClosureKind, Gap, Injury},
     ledger::Record,
 };
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use std::collections::BTreeMap;
 
 /// [`Wounds`] in a file.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(rename = "Wounds", deny_unknown_fields)]
-pub(super) struct SavedWounds {
+struct SavedWounds {
     retraction: Retraction,
     generation: u32,
     injuries: BTreeMap<u32, Injury>,
@@ -36,6 +37,18 @@ impl TryFrom<SavedWounds> for Wounds {
         wounds.generation = saved.generation;
         (wounds.injuries, wounds.ends, wounds.clamps) = (saved.injuries, saved.ends, saved.clamps);
         Ok(wounds)
+    }
+}
+
+impl Serialize for Wounds {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SavedWounds::from(self.without_history()).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Wounds {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        SavedWounds::deserialize(deserializer)?.try_into().map_err(D::Error::custom)
     }
 }
 

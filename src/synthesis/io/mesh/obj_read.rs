@@ -1,6 +1,6 @@
 //! Reading an organ's mesh from a Wavefront OBJ file.
 
-use super::load::{Fault, MeshReadError, read_bytes};
+use super::read::{Fault, MeshReadError, read_bytes};
 use crate::synthesis::mesh::TriangleMesh;
 use bevy_math::{Vec2, Vec3};
 use std::path::Path;

@@ -3,7 +3,7 @@
 //! The `gltf` crate decodes the JSON; the container and the data behind it are read here, where every offset and count is
 //! checked, so that a damaged file is an error.
 
-use super::load::{Fault, MeshReadError, read_bytes};
+use super::read::{Fault, MeshReadError, read_bytes};
 use crate::synthesis::mesh::{MAX_TRIANGLES, TriangleMesh};
 use bevy_math::{Mat4, Quat, Vec2, Vec3};
 use gltf::json::{

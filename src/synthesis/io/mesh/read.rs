@@ -1,0 +1,79 @@
+//! What readers of all formats share: the bytes of a file, and why it cannot be read.
+
+use crate::synthesis::mesh::MeshError;
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+/// Why a mesh could not be read from a file.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshReadError {
+    /// The file, or one it refers to, cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A name that ends in none of the formats that are read.
+    #[error("cannot read {}: meshes are read from .glb, .gltf and .obj files", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Content that is damaged or of an unsupported kind.
+    #[error("cannot read {}: {cause}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// Content that makes no usable mesh.
+    #[error("cannot use the mesh in {}: {source}", path.display())]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with the mesh.
+        source: MeshError,
+    },
+}
+
+/// What went wrong while content was decoded, before the file's name is known.
+#[derive(Debug)]
+pub(super) enum Fault {
+    /// A file that the content refers to cannot be read.
+    Io(PathBuf, io::Error),
+    /// Anything about the content.
+    Content(String),
+    /// The mesh that was decoded.
+    Mesh(MeshError),
+}
+
+impl Fault {
+    pub(super) fn content(cause: impl Into<String>) -> Self {
+        Self::Content(cause.into())
+    }
+
+    pub(super) fn in_file(self, path: &Path) -> MeshReadError {
+        let named = path.to_path_buf();
+        match self {
+            Self::Io(path, source) => MeshReadError::Io { path, source },
+            Self::Content(cause) => MeshReadError::Content { path: named, cause },
+            Self::Mesh(source) => MeshReadError::Mesh { path: named, source },
+        }
+    }
+}
+
+impl From<MeshError> for Fault {
+    fn from(error: MeshError) -> Self {
+        Self::Mesh(error)
+    }
+}
+
+/// The bytes of a file.
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, Fault> {
+    std::fs::read(path).map_err(|error| Fault::Io(path.to_path_buf(), error))
+}
