@@ -1,6 +1,6 @@
 //! What a step did, in numbers.
 
-/// What one step did.
+/// Report of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepReport {
     /// Number of the step, from 1.
@@ -9,21 +9,21 @@ pub struct StepReport {
     pub sampled: u32,
     /// Candidates that became oxygen drains.
     pub born: u32,
-    /// What the arteries did.
+    /// Report of the arteries.
     pub arterial: SystemReport,
-    /// What the veins did.
+    /// Report of the veins.
     pub venous: SystemReport,
 }
 
-/// What one step did to one system.
+/// Report of one step of one system.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SystemReport {
     /// Nodes before the step: the first new node's index.
     pub first_new_node: u32,
-    /// Nodes that were added.
+    /// Number of new nodes.
     pub new_nodes: u32,
-    /// Drains that were supplied and removed.
+    /// Number of drains that were supplied and removed.
     pub supplied: u32,
-    /// Drains that are left.
+    /// Number of remaining drains.
     pub drains_left: u32,
 }

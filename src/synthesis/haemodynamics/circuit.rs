@@ -17,48 +17,48 @@ pub(super) const SOURCE: u32 = 1;
 /// Slots before that of node 0.
 pub(super) const FIRST: usize = 2;
 
-/// Resistance that lets nothing through. Far from the ends of `f64`, so that products with it stay finite.
+/// Resistance that lets nothing through. Far from the limits of `f64`, so that products with it stay finite.
 pub(super) const CLOSED: f64 = 1e200;
 
-/// Where a slot stands in the tree.
+/// The place of a slot in the tree.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Link {
-    /// The slot that the segment draws from: the parent, or the reference where the segment is interrupted.
+    /// The slot that feeds the segment: the parent, or the reference if the segment is interrupted.
     pub upstream: u32,
-    /// The parent's slot, whether the segment is interrupted or not.
+    /// The parent's slot, even if the segment is interrupted.
     pub parent: u32,
-    /// Child of the highest index, or none.
+    /// Child with the highest index, or none.
     pub first_child: u32,
-    /// The parent's next child in falling order of the index, or none.
+    /// The parent's next child in falling order of index, or none.
     pub next_sibling: u32,
 }
 
-/// A current Y·p − S that leaves a node of pressure p.
+/// A current Y·p − S out of a node of pressure p.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Shunt {
     /// Conductance, in m³/(s·Pa).
     pub y: f64,
-    /// Current at pressure 0 with its sign turned, in m³/s.
+    /// Negative of the current at pressure 0, in m³/s.
     pub s: f64,
 }
 
 impl Shunt {
-    /// The same current, by pressures that count from one of `pressure`.
+    /// The same current, for pressures relative to `pressure`.
     pub fn counted_from(self, pressure: f64) -> Self {
         Self { y: self.y, s: self.s - self.y * pressure }
     }
 }
 
-/// State of a segment and the node that it ends in.
+/// State of a segment and its end node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Slot {
     /// Resistance of the segment, in Pa·s/m³.
     pub resistance: f64,
-    /// All that leaves the node downwards.
+    /// All currents that leave the node downwards.
     pub below: Shunt,
     /// 1/(1 + R·Y): share of `below` that the segment passes on.
     pub through: f64,
-    /// Pressure of the node above the bed's, in Pa, as of the last solution.
+    /// Pressure of the node relative to the bed's, in Pa, as of the last solution.
     pub pressure: f64,
 }
 
@@ -69,7 +69,7 @@ pub(super) struct Circuit {
     pub slots: Vec<Slot>,
     /// The bed below each slot's node.
     pub beds: Vec<Shunt>,
-    /// The bed, and the open ends as of the last solution.
+    /// The bed, plus the open ends as of the last solution.
     pub shunts: Vec<Shunt>,
 }
 
@@ -118,7 +118,7 @@ impl Circuit {
         pace.part(0.2..1.0).each(count - FIRST, sum).await;
     }
 
-    /// The sums of one node again, from its children, bit for bit as [`sum_all`](Self::sum_all) has them.
+    /// Sums one node again, from its children, with the same bits as [`sum_all`](Self::sum_all).
     pub fn sum_at(&mut self, index: u32) {
         let mut below = self.shunts[index as usize];
         let mut child = self.links[index as usize].first_child;
@@ -136,7 +136,7 @@ impl Circuit {
         slot.through = 1.0 / (1.0 + slot.resistance * below.y);
     }
 
-    /// The sums of a node and of all above it.
+    /// Sums a node and all above it.
     pub fn sum_path(&mut self, mut index: u32) {
         while index > SOURCE {
             self.sum_at(index);
@@ -144,7 +144,7 @@ impl Circuit {
         }
     }
 
-    /// The sums of some nodes and of all above them, each once: a parent's slot is below its children's.
+    /// Sums some nodes and all above them, each once: a parent's slot is lower than its children's.
     pub fn sum_paths(&mut self, slots: Vec<u32>) {
         let mut due = BinaryHeap::from(slots);
         while let Some(slot) = due.pop().filter(|&slot| slot > SOURCE) {

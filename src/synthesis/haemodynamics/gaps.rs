@@ -17,10 +17,10 @@ impl Network {
         self.interruptions.iter().map(|&(node, interruption)| (NodeId(node), interruption))
     }
 
-    /// Lays a gap over a node's segment in place of the one that was there, or heals it with `None`.
+    /// Lays a gap over a node's segment, replacing any old one, or heals it with `None`.
     ///
-    /// Only the path from the segment to its root is computed again. An end that stays as it was keeps how far it has
-    /// [closed](Self::set_opening).
+    /// Only the path from the segment to its root is computed again. An unchanged end keeps its
+    /// [opening](Self::set_opening).
     ///
     /// # Errors
     /// When there is no such node, it is a root, or a number is outside its limits.
@@ -39,7 +39,7 @@ impl Network {
         self.revision += 1;
         self.link(node, interruption.is_none());
         self.replace_ends(node, interruption);
-        // The new ends count as closed until they are solved for.
+        // The new ends count as closed until they are solved.
         self.ends.load_at(&[parent, slot as u32], &mut self.circuit);
         if !self.sums_stale {
             self.circuit.sum_path(slot as u32);
@@ -48,13 +48,14 @@ impl Network {
         Ok(())
     }
 
-    /// Takes the gaps of a list in place of all that there are, as after an undo: the same as taking one by one what
-    /// differs, at the cost of that, or of one sweep over the tree where that is less.
+    /// Replaces all gaps by those of a list, for example after an undo. The result equals setting the differing gaps
+    /// one by one; the cost is that, or one sweep over the tree if that is less.
     ///
     /// `interruptions` is in rising order of the nodes, each once.
     ///
     /// # Errors
-    /// As [`set_interruption`](Self::set_interruption), or when the nodes don't rise. The network is as before, then.
+    /// As [`set_interruption`](Self::set_interruption), or if the nodes are not in rising order. The network is
+    /// unchanged then.
     pub fn set_interruptions(&mut self, interruptions: &[(NodeId, Interruption)]) -> Result<(), FlowError> {
         for (node, interruption) in interruptions {
             self.check_gap(*node, Some(interruption))?;
@@ -74,12 +75,12 @@ impl Network {
         Ok(())
     }
 
-    /// Gaps up to which each is laid by itself.
+    /// Most gaps that are laid one by one.
     const FEW_GAPS: usize = 16;
-    /// Nodes for each gap below which all sums are made anew, rather than those above the gaps: what a path costs.
+    /// Nodes per gap below which all sums are made again, instead of those above the gaps: the cost of a path.
     const NODES_PER_PATH: usize = 128;
 
-    /// The nodes whose gaps are others in a list, in rising order.
+    /// The nodes whose gaps differ in a list, in rising order.
     fn differing(&self, interruptions: &[(NodeId, Interruption)]) -> Vec<NodeId> {
         let mut before = self.interruptions.iter().map(|&(node, gap)| (NodeId(node), gap)).peekable();
         let mut differing = Vec::new();
@@ -95,7 +96,7 @@ impl Network {
         differing
     }
 
-    /// Takes the gaps of a list, which differ from those that there are at some nodes, and sums once.
+    /// Takes the gaps of a list, which differ from the present ones at some nodes, and sums once.
     fn take_gaps(&mut self, interruptions: &[(NodeId, Interruption)], changed: &[NodeId]) {
         self.revision += 1;
         self.interruptions = interruptions.iter().map(|&(node, gap)| (node.0, gap)).collect();
@@ -119,7 +120,7 @@ impl Network {
         }
     }
 
-    /// Passes a gap, or its healing, and gives the slot of the segment's parent.
+    /// Checks a gap, or its healing, and returns the slot of the segment's parent.
     fn check_gap(&self, node: NodeId, interruption: Option<&Interruption>) -> Result<u32, FlowError> {
         self.check(node)?;
         if let Some(interruption) = interruption {
@@ -131,7 +132,7 @@ impl Network {
         }
     }
 
-    /// Lets a segment carry blood, or none.
+    /// Connects or disconnects a segment.
     fn link(&mut self, node: NodeId, is_whole: bool) {
         let slot = node_slot(node.index());
         self.circuit.links[slot].upstream = if is_whole { self.circuit.links[slot].parent } else { REFERENCE };
@@ -153,7 +154,7 @@ impl Network {
         Ok(())
     }
 
-    /// The open ends of an interruption in place of those that the segment had.
+    /// Replaces the open ends of a segment by those of an interruption.
     fn replace_ends(&mut self, node: NodeId, interruption: Option<Interruption>) {
         self.ends.replace(node, ends_of(node, interruption));
         self.measure_ends_of(node);

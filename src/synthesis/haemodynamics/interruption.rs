@@ -14,8 +14,8 @@ pub struct Outlet {
 
 /// A gap in a segment, laid over the tree by cuts and clamps.
 ///
-/// The vessel is intact from the parent to the share `first`, and from the share `last` to the node; what lies between
-/// carries nothing. A plain clamp has `first == last` and both ends closed.
+/// The vessel is intact from the parent to the share `first`, and from the share `last` to the node; the part in
+/// between carries nothing. A clamp has `first == last` and both ends closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Interruption {
@@ -23,9 +23,9 @@ pub struct Interruption {
     pub first: f32,
     /// Share from which it is intact again. Limits: `first` to 1.
     pub last: f32,
-    /// The hole at `first`; `None` where that end is clamped, sealed or tied.
+    /// The hole at `first`; `None` if that end is clamped, sealed or tied.
     pub proximal: Option<Outlet>,
-    /// The hole at `last`; `None` where that end is closed.
+    /// The hole at `last`; `None` if that end is closed.
     pub distal: Option<Outlet>,
 }
 

@@ -10,28 +10,29 @@ use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use crate::synthesis::units::Pressure;
 
 /// Conductance of a bed that holds its terminal at its own pressure, in conductances of the terminal's segment. Large
-/// enough that 1 + HELD is HELD in `f64`: it makes no difference to infinity, and needs no case of its own.
+/// enough that 1 + HELD is HELD in `f64`: it acts like infinity, without a case of its own.
 const HELD: f64 = (1u64 << 60) as f64;
 
-/// What leaks from a link into the bed's pool, in conductances of the link. It holds pieces that hang between links
-/// alone, and is lost among the digits of every flow.
+/// Leak from a link into the bed's pool, in conductances of the link. It fixes the pressure of pieces that only links
+/// connect, and is below the accuracy of every flow.
 const LEAK: f64 = 1e-11;
 
-/// Least length of a segment, in its radii. A segment of no length is a joint; this keeps its conductance finite.
+/// Least length of a segment, in its radii, which keeps the conductance of a segment of zero length finite.
 const LEAST_LENGTH: f64 = 1e-6;
 
-/// What [`Network::update`] found.
+/// The result of [`Network::update`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NetworkUpdate {
-    /// Nodes that are new.
+    /// Number of new nodes.
     pub appended: usize,
-    /// Segments whose radius or length changed.
+    /// Number of segments whose radius or length changed.
     pub changed: usize,
-    /// Whether the tree is another one, not the old one grown on: the network was made anew, without interruptions.
+    /// Whether the tree is another one, rather than the old one grown further. Then the network was made again, without
+    /// interruptions.
     pub replaced: bool,
 }
 
-/// The network of resistances of one tree, with its wounds and its solution.
+/// The network of resistances of one tree, with its interruptions and its solution.
 #[derive(Clone, Debug)]
 pub struct Network {
     pub(super) settings: FlowSettings,
@@ -40,21 +41,21 @@ pub struct Network {
     /// 8µ/(πr⁴) of every node's segment.
     pub(super) per_length: Vec<f64>,
     pub(super) circuit: Circuit,
-    /// Links that join each node to another network; empty where none is.
+    /// Number of links that join each node to another network; empty without links.
     pub(super) link_counts: Vec<u32>,
-    /// Root pressure above the bed's, in Pa.
+    /// Root pressure relative to the bed's, in Pa.
     pub(super) source: f64,
     /// Pressure of the bed, in Pa.
     pub(super) bed: f64,
-    /// In the order of the node.
+    /// In the order of their nodes.
     pub(super) interruptions: Vec<(u32, Interruption)>,
     pub(super) ends: OpenEnds,
     pub(super) pressures: Vec<f64>,
     pub(super) flows: Vec<f64>,
-    /// Whether `below` and `through` have to be summed again from all tips.
+    /// Whether `below` and `through` must be summed again from all tips.
     pub(super) sums_stale: bool,
     pub(super) path: Vec<u32>,
-    /// Rises with every change of the tree, its gaps and what its nodes drain into.
+    /// Rises with every change of the tree, its gaps and its beds.
     pub(super) revision: u64,
 }
 
@@ -67,7 +68,7 @@ impl Network {
         at_once(Self::new_paced(tree, settings, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -97,10 +98,10 @@ impl Network {
         Ok(network)
     }
 
-    /// Follows a tree that grew, whose radii changed or whose nodes moved. Only what changed is computed again.
+    /// Follows a tree that grew, whose radii changed or whose nodes moved. Only changes are computed again.
     ///
     /// # Errors
-    /// When a number of the tree is not finite, or a radius not above 0. The network is as before, then.
+    /// When a number of the tree is not finite, or a radius not above 0. The network is unchanged then.
     pub fn update(&mut self, tree: &VesselTree) -> Result<NetworkUpdate, FlowError> {
         tree.validate()?;
         let before = self.len();
@@ -145,7 +146,7 @@ impl Network {
         self.circuit.clear();
     }
 
-    /// Takes over the nodes that the tree has more.
+    /// Adds the tree's new nodes.
     async fn append(&mut self, tree: &VesselTree, pace: &Pace) {
         let before = self.len();
         let add = |number: usize| {
@@ -158,7 +159,7 @@ impl Network {
             self.set_radius(node, tree.radii()[node]);
         };
         pace.part(0.0..0.8).each(tree.len() - before, add).await;
-        // After all links, which say what is a terminal and no longer is one.
+        // After all links of nodes, which decide whether a node is a terminal.
         let measure = |number: usize| {
             let node = before + number;
             self.set_resistance(node);
@@ -195,7 +196,7 @@ impl Network {
             return 0.0;
         }
         let least = LEAST_LENGTH * self.settings.scale.to_metres(self.radii[node]);
-        // At least so much that its inverse stays finite, at most what lets nothing through.
+        // At least large enough for a finite inverse, at most the resistance that lets nothing through.
         (self.per_length[node] * self.lengths[node].max(least)).clamp(1.0 / CLOSED, CLOSED)
     }
 
@@ -205,7 +206,7 @@ impl Network {
         self.set_bed(node);
     }
 
-    /// What a node drains into: its links, or the pool if it is a terminal without any. A root without children is no
+    /// Sets a node's bed: its links, or the pool if it is a terminal without links. A root without children is no
     /// terminal.
     pub(super) fn set_bed(&mut self, node: usize) {
         let link = self.circuit.links[node + FIRST];
@@ -260,7 +261,7 @@ impl Network {
         self.radii.is_empty()
     }
 
-    /// The settings it was made with.
+    /// The settings that it was made with.
     pub fn settings(&self) -> &FlowSettings {
         &self.settings
     }
@@ -288,22 +289,22 @@ impl Network {
         Ok(())
     }
 
-    /// The pressure that the bed's pool is held at.
+    /// The pressure of the bed's pool.
     pub fn bed_pressure(&self) -> Pressure {
         Pressure::from_pascals(self.bed)
     }
 
-    /// The pressure that roots are held at.
+    /// The pressure of all roots.
     pub fn root_pressure(&self) -> Pressure {
         Pressure::from_pascals(self.source + self.bed)
     }
 
-    /// Pressure outside above the bed's.
+    /// Pressure outside, relative to the bed's.
     pub(super) fn ambient(&self) -> f64 {
         self.settings.ambient.pascals() - self.bed
     }
 
-    /// Checks that a node is there.
+    /// Checks that a node exists.
     pub(super) fn check(&self, node: NodeId) -> Result<(), FlowError> {
         if node.index() < self.len() { Ok(()) } else { Err(FlowError::NoSuchNode { node: node.0, nodes: self.len() }) }
     }

@@ -1,4 +1,4 @@
-//! Open ends, and how much they let out.
+//! Open ends and their flow.
 
 use super::{
     FlowError, Outlet,
@@ -15,9 +15,9 @@ use std::ops::Range;
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum EndSide {
-    /// The end towards the root: it bleeds what the root drives.
+    /// The end towards the root: the root drives its bleeding.
     Proximal,
-    /// The end towards the terminals: it bleeds back what the bed drives.
+    /// The end towards the terminals: the bed drives its back-bleeding.
     Distal,
 }
 
@@ -28,13 +28,13 @@ pub struct NetworkEnd {
     pub node: NodeId,
     /// Which end of the gap.
     pub side: EndSide,
-    /// Where on the segment, as a share of the way from its parent.
+    /// Place on the segment, as a share of the way from its parent.
     pub along: f32,
     /// The hole.
     pub outlet: Outlet,
     /// Share of the hole's area that clotting has left open.
     pub opening: f64,
-    /// What leaves through it, in m³/s.
+    /// Flow through it, in m³/s.
     pub(super) flow: f64,
     /// Pressure in the vessel before the hole, in Pa.
     pressure: f64,
@@ -48,7 +48,7 @@ pub struct NetworkEnd {
     orifice: f64,
     /// The joint of the skeleton at the node.
     joint: u32,
-    /// What the end draws from the node, as of the last solution.
+    /// The end's draw from the node, as of the last solution.
     pub(super) stump: Shunt,
 }
 
@@ -72,7 +72,7 @@ impl NetworkEnd {
         }
     }
 
-    /// What leaves through it; never negative.
+    /// Flow through it; never negative.
     pub fn flow(&self) -> Flow {
         Flow::from_cubic_metres_per_second(self.flow)
     }
@@ -82,7 +82,7 @@ impl NetworkEnd {
         Pressure::from_pascals(self.pressure)
     }
 
-    /// Mean velocity in the hole, in m/s; 0 for one that has closed.
+    /// Mean velocity in the hole, in m/s; 0 if it has closed.
     pub fn velocity(&self) -> f64 {
         if self.flow > 0.0 { self.flow / (self.area * self.opening) } else { 0.0 }
     }
@@ -91,12 +91,12 @@ impl NetworkEnd {
         self.side == EndSide::Proximal
     }
 
-    /// Whether it is the same hole, not one that a later cut made on the same segment.
+    /// Whether it is the same hole, not that of a later cut of the same segment.
     fn is_same(&self, other: &Self) -> bool {
         (self.node, self.side, self.along, self.outlet) == (other.node, other.side, other.along, other.outlet)
     }
 
-    /// Sets what follows from the segment and the hole.
+    /// Sets the values that depend on the segment and the hole.
     pub(super) fn measure(&mut self, attached: u32, piece: f64, scale: Scale, discharge: f64) {
         let radius = scale.to_metres(self.outlet.radius);
         self.area = std::f64::consts::PI * radius * radius;
@@ -113,12 +113,12 @@ impl NetworkEnd {
         shunt.s += self.stump.s;
     }
 
-    /// K of what is open of the hole.
+    /// K of the open part of the hole.
     fn narrowed(&self) -> f64 {
         self.orifice / (self.opening * self.opening)
     }
 
-    /// The flow that a difference of pressure drives through piece and hole: Δ = R·Q + K·Q².
+    /// The flow through piece and hole at a difference of pressure: Δ = R·Q + K·Q².
     fn driven(&self, difference: f64) -> f64 {
         if !(difference > 0.0 && self.opening > 0.0) {
             return 0.0;
@@ -131,26 +131,26 @@ impl NetworkEnd {
 /// All open ends of a network.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OpenEnds {
-    /// In the order of the node, proximal before distal.
+    /// In the order of their nodes, proximal before distal.
     list: Vec<NetworkEnd>,
     skeleton: Skeleton,
-    /// Whether the skeleton has to be traced again.
+    /// Whether the skeleton must be traced again.
     pub is_untraced: bool,
-    /// Whether flows have to be solved for again.
+    /// Whether flows must be solved again.
     pub is_unsolved: bool,
-    /// Whether the network's sums don't have the flows yet.
+    /// Whether the flows are missing in the network's sums.
     is_unloaded: bool,
 }
 
 impl OpenEnds {
-    /// Passes after which an iteration that circles is damped.
+    /// Passes after which the iteration is damped, in case it cycles.
     const UNDAMPED: usize = 20;
-    /// Passes of the iteration before it counts as failed; some five are usual.
+    /// Passes after which the iteration counts as failed; some five are usual.
     const MOST_PASSES: usize = 200;
-    /// Change of a flow, relative to it, below which the iteration ends. It converges quadratically, so that the law
-    /// then holds to the square of this.
+    /// Relative change of a flow below which the iteration ends. It converges quadratically, so the law then holds to
+    /// the square of this.
     pub const ACCURACY: f64 = 1e-8;
-    /// Flow that counts as none, relative to the largest.
+    /// Flow that counts as zero, relative to the largest.
     const NEGLIGIBLE: f64 = 1e-14;
 
     pub fn all(&self) -> &[NetworkEnd] {
@@ -166,13 +166,13 @@ impl OpenEnds {
         self.is_untraced = true;
     }
 
-    /// Puts ends in the place of all that a segment had. One that is the same keeps its state.
+    /// Replaces all ends of a segment. An unchanged end keeps its state.
     pub fn replace(&mut self, node: NodeId, ends: [Option<NetworkEnd>; 2]) {
         let indices = self.indices_of(node);
         let kept = |end: NetworkEnd| {
             let before = self.list[indices.clone()].iter().find(|before| before.is_same(&end));
             let mut end = before.copied().unwrap_or(end);
-            // The network below it is another one now.
+            // The network at the end has changed.
             end.stump = Shunt::default();
             end
         };
@@ -181,13 +181,13 @@ impl OpenEnds {
         self.is_untraced = true;
     }
 
-    /// Where the ends of a segment are in the list.
+    /// Positions of a segment's ends in the list.
     pub fn indices_of(&self, node: NodeId) -> Range<usize> {
         self.list.partition_point(|end| end.node < node)..self.list.partition_point(|end| end.node <= node)
     }
 
-    /// Puts ends in the place of all that there are, in the order of the node, proximal before distal. One that is the same
-    /// keeps its state; those of `changed` segments, which are in rising order, draw nothing until they are solved for.
+    /// Replaces all ends, in the order of their nodes, proximal before distal. An unchanged end keeps its state; those
+    /// of `changed` segments, which are in rising order, draw nothing until they are solved.
     pub fn replace_all(&mut self, ends: Vec<NetworkEnd>, changed: &[NodeId]) {
         let mut before = std::mem::replace(&mut self.list, ends).into_iter().peekable();
         let mut changed = changed.iter().peekable();
@@ -210,7 +210,7 @@ impl OpenEnds {
         self.list[index].opening = share;
     }
 
-    /// Traces the skeleton again where that is due. The circuit's sums must be right.
+    /// Traces the skeleton again if needed. The circuit's sums must be right.
     pub fn trace(&mut self, circuit: &Circuit) {
         if !std::mem::take(&mut self.is_untraced) {
             return;
@@ -225,9 +225,9 @@ impl OpenEnds {
 
     /// Finds the flows of all ends at once.
     ///
-    /// Newton's method on Δ = R·Q + K·Q² in the flows, in which the law is convex: from a flow too large it comes down to
-    /// the solution without passing it. Each pass solves the skeleton exactly. `source` and `ambient` are above the bed's
-    /// pressure `bed`.
+    /// Newton's method on Δ = R·Q + K·Q² in the flows, in which the law is convex: from a larger flow it falls to the
+    /// solution without passing it. Each pass solves the skeleton exactly. `source` and `ambient` are relative to the
+    /// bed's pressure `bed`.
     pub fn solve(&mut self, source: f64, ambient: f64, bed: f64) -> Result<(), FlowError> {
         if !std::mem::take(&mut self.is_unsolved) {
             return Ok(());
@@ -252,8 +252,8 @@ impl OpenEnds {
         Err(FlowError::NotConverged { what: "the flow through open ends", passes: Self::MOST_PASSES, residual })
     }
 
-    /// First guess: the last flow, or what an end alone would let out. An end with too little pressure while all are
-    /// closed has no flow, since others can only take pressure from it.
+    /// First guess: the last flow, or that of an end alone. An end with too little pressure while all are closed has no
+    /// flow, since others can only lower its pressure.
     fn start(&mut self, source: f64, ambient: f64) {
         self.skeleton.begin(ambient);
         self.skeleton.solve(source, ambient);
@@ -263,7 +263,7 @@ impl OpenEnds {
         }
     }
 
-    /// One pass. Returns the largest change of a flow, in units of what is tolerated.
+    /// One pass. Returns the largest change of a flow, in units of the tolerance.
     fn pass(&mut self, source: f64, ambient: f64, damped: bool) -> f64 {
         self.linearise();
         self.skeleton.begin(ambient);
@@ -277,7 +277,7 @@ impl OpenEnds {
         residual
     }
 
-    /// What every end draws by the tangent to its law at its flow, by pressures above that outside.
+    /// Sets every end's draw to the tangent of its law at its flow, for pressures relative to that outside.
     pub fn linearise(&mut self) {
         for end in &mut self.list {
             end.stump = Shunt::default();
@@ -292,15 +292,15 @@ impl OpenEnds {
         }
     }
 
-    /// What the ends draw, by pressures that count from one of `pressure`.
+    /// Converts the ends' draw to pressures relative to `pressure`.
     pub fn count_from(&mut self, pressure: f64) {
         for end in &mut self.list {
             end.stump = end.stump.counted_from(pressure);
         }
     }
 
-    /// Takes the flows that follow from the pressures of a linearised solution, which are above that outside and exact to
-    /// `rounding`. Returns the largest change of a flow, in units of what is tolerated.
+    /// Takes the flows that follow from the pressures of a linearised solution, which are above that outside and exact
+    /// to `rounding`. Returns the largest change of a flow, in units of the tolerance.
     pub fn accept(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, rounding: f64, damped: bool) -> f64 {
         let largest = self.list.iter().map(|end| end.flow).fold(0.0, f64::max);
         let mut residual = 0.0_f64;
@@ -318,8 +318,8 @@ impl OpenEnds {
         residual
     }
 
-    /// Pressures, and what the ends draw as conductances to the outside, by pressures above the bed's. The pressures of
-    /// the solution are above that outside.
+    /// Sets pressures, and the ends' draw as conductances to the outside, for pressures relative to the bed's. The
+    /// pressures of the solution are relative to that outside.
     pub fn finish(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, ambient: f64, bed: f64) {
         for end in &mut self.list {
             let difference = pressure(end);

@@ -1,4 +1,4 @@
-//! What a solved network tells: pressures and flows by node, and what follows from them.
+//! The solution of a network: pressures and flows by node, and values derived from them.
 
 use super::{
     Network, NetworkEnd,
@@ -9,22 +9,22 @@ use crate::synthesis::units::Flow;
 impl Network {
     /// Pressure of every node in pascals, as of the last [`solve`](Self::solve).
     ///
-    /// A node that nothing connects to a root or the bed has the bed's pressure.
+    /// A node without a connection to a root or the bed has the bed's pressure.
     pub fn pressures(&self) -> &[f64] {
         &self.pressures
     }
 
-    /// Flow into every segment at its upper end in m³/s, as of the last [`solve`](Self::solve), by the node that the
-    /// segment ends in. Positive flow goes from the root to the terminals.
+    /// Flow into every segment at its upper end in m³/s, as of the last [`solve`](Self::solve), by its end node.
+    /// Positive flow goes from the root to the terminals.
     ///
-    /// At a root it is the flow into its tree. At an interrupted segment it is what leaves through the cut's proximal
-    /// end; what its distal end loses is in [`open_ends`](Self::open_ends).
+    /// At a root it is the flow into its tree. At an interrupted segment it is the flow out of the cut's proximal end;
+    /// that of the distal end is in [`open_ends`](Self::open_ends).
     pub fn flows(&self) -> &[f64] {
         &self.flows
     }
 
-    /// Flow from a node into the bed in m³/s, as of the last solution; negative where the bed feeds the vessel, and 0
-    /// where the node is no terminal.
+    /// Flow from a node into the bed in m³/s, as of the last solution; negative if the bed feeds the vessel, and 0 if
+    /// the node is no terminal.
     ///
     /// # Panics
     /// When the node is not of this network.

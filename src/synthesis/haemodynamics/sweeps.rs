@@ -19,7 +19,7 @@ impl Network {
         at_once(self.solve_paced(&Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`solve`](Self::solve).
@@ -34,7 +34,7 @@ impl Network {
 
     /// Brings open ends and sums up to date, without pressures and flows of all nodes.
     ///
-    /// Costs what the paths from the open ends to the roots are long; nothing that grows with the tree, unless the tree
+    /// The cost is the length of the paths from the open ends to the roots, not the size of the tree, unless the tree
     /// itself has changed.
     ///
     /// # Errors
@@ -45,7 +45,7 @@ impl Network {
         Ok(())
     }
 
-    /// Brings the flow at open ends up to date, and no more: neither sums nor other pressures.
+    /// Brings only the flow at open ends up to date, but no sums or other pressures.
     ///
     /// # Errors
     /// When it did not converge.
@@ -80,7 +80,7 @@ impl Network {
         Ok(Pressure::from_pascals(pressure + self.bed))
     }
 
-    /// Pressures and flows of all nodes, from the sums.
+    /// Computes pressures and flows of all nodes from the sums.
     pub(super) async fn spread_pressures(&mut self, pace: &Pace) {
         self.circuit.slots[REFERENCE as usize].pressure = 0.0;
         self.circuit.slots[SOURCE as usize].pressure = self.source;

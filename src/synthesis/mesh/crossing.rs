@@ -2,14 +2,14 @@
 
 use bevy_math::DVec2;
 
-/// Where the line through `point`, upright on the plane of `flat`, crosses a triangle: whether the triangle faces up (1)
-/// or down (−1) there, and the height.
+/// The crossing of a triangle with the line through `point` perpendicular to the plane of `flat`: whether the triangle
+/// faces up (1) or down (−1), and the height.
 ///
-/// A line through an edge or a vertex counts as moved aside by an infinitesimal amount, the same for all triangles, so
-/// that a closed surface is crossed once in each place.
+/// A line through an edge or a vertex counts as moved by an infinitesimal amount, the same for all triangles, so it
+/// crosses a closed surface once at each place.
 pub(crate) fn crossing(point: DVec2, flat: [DVec2; 3], heights: [f64; 3]) -> Option<(i16, f64)> {
     let [a, b, c] = flat;
-    // Twice the areas of the triangles between the point and the edges opposite a, b and c.
+    // Twice the areas of the triangles formed by the point and the edges opposite a, b and c.
     let (areas_a, areas_b, areas_c) = (side(b, c, point), side(c, a, point), side(a, b, point));
     let facing = areas_a.1;
     if areas_b.1 != facing || areas_c.1 != facing {
@@ -23,9 +23,9 @@ pub(crate) fn crossing(point: DVec2, flat: [DVec2; 3], heights: [f64; 3]) -> Opt
     Some((facing, height))
 }
 
-/// Twice the signed area between a directed edge and a point, and the side of the edge on which the point is: 1 for left.
+/// Twice the signed area of the triangle of a directed edge and a point, and the point's side of the edge: 1 for left.
 fn side(from: DVec2, to: DVec2, point: DVec2) -> (f64, i16) {
-    // Always computed for the same direction of an edge, so that both of its triangles see the same rounding.
+    // Always computed for the same direction of an edge, so that both of its triangles get the same rounding.
     let ordered = (from.x, from.y) < (to.x, to.y);
     let (low, high) = if ordered { (from, to) } else { (to, from) };
     let edge = high - low;

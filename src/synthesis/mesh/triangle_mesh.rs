@@ -1,9 +1,10 @@
 //! Triangle meshes of organs: checked once, then safe for every stage.
 //!
-//! In come positions, triangles and, where there are any, texture coordinates, as a file or an engine's mesh holds them:
-//! vertices may be duplicated along seams, triangles may be degenerate. [`TriangleMesh::new`] refuses only what no stage
-//! could use and says why. Out come measures ([area](TriangleMesh::area), [volume](TriangleMesh::signed_volume),
-//! [bounds](TriangleMesh::bounds)), smooth [normals](TriangleMesh::vertex_normals) and the [`topology`](super::topology).
+//! In: positions, triangles and optional texture coordinates, as in a file or an engine's mesh: vertices may be
+//! duplicated along seams, triangles may be degenerate. [`TriangleMesh::new`] refuses only meshes that no stage can
+//! use, and says why. Out: measures ([area](TriangleMesh::area), [volume](TriangleMesh::signed_volume),
+//! [bounds](TriangleMesh::bounds)), smooth [normals](TriangleMesh::vertex_normals) and the
+//! [`topology`](super::topology).
 
 use bevy_math::{
     DVec3, Vec2, Vec3,
@@ -15,7 +16,7 @@ pub const MAX_COORDINATE: f32 = 1.0e9;
 
 /// Whether all coordinates are finite and within [`MAX_COORDINATE`].
 pub(crate) fn is_usable(position: Vec3) -> bool {
-    // The greatest of NaN and a number may be the number, so both are asked.
+    // The maximum of NaN and a number may be the number, so both are tested.
     position.is_finite() && position.abs().max_element() <= MAX_COORDINATE
 }
 
@@ -39,9 +40,9 @@ pub enum MeshError {
     /// More vertices or triangles than [`MAX_TRIANGLES`].
     #[error("the mesh has {count} {what}, more than {MAX_TRIANGLES}; decimate it first")]
     TooLarge {
-        /// What there is too much of.
+        /// What exceeds the limit.
         what: &'static str,
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
     /// A vertex with a NaN or infinite coordinate, or one beyond [`MAX_COORDINATE`].
@@ -51,7 +52,7 @@ pub enum MeshError {
     BadPosition {
         /// The first such vertex.
         vertex: usize,
-        /// Where it is.
+        /// Its position.
         position: Vec3,
     },
     /// A triangle with a vertex that does not exist.
@@ -84,7 +85,7 @@ pub enum MeshError {
     },
 }
 
-/// An indexed triangle mesh that has passed [`new`](Self::new).
+/// An indexed triangle mesh, checked by [`new`](Self::new).
 ///
 /// It has at least one triangle with an area, every index is in range and every coordinate finite. Triangles are
 /// counter-clockwise seen from outside where the mesh has an outside.
@@ -102,7 +103,7 @@ impl TriangleMesh {
     /// source; see [`welded`](Self::welded) for a copy without them.
     ///
     /// # Errors
-    /// The first thing that no later stage could work with: see [`MeshError`].
+    /// The first error that makes the mesh unusable: see [`MeshError`].
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, uvs: Option<Vec<Vec2>>) -> Result<Self, MeshError> {
         let (vertices, count) = (positions.len(), triangles.len());
         for (what, count) in [("vertices", vertices), ("triangles", count)] {
@@ -176,7 +177,7 @@ impl TriangleMesh {
         0.5 * doubled_normal(self.corners(triangle)).length()
     }
 
-    /// Whether a triangle has no area to speak of: its corners coincide or lie on a line.
+    /// Whether a triangle has no significant area: its corners coincide or lie on a line.
     ///
     /// # Panics
     /// When there is no such triangle.
@@ -191,15 +192,14 @@ impl TriangleMesh {
 
     /// Volume enclosed by the triangles, by the divergence theorem, in cubic tissue lengths.
     ///
-    /// Negative where triangles face inwards. Meaningless for an open mesh; where shells overlap, the overlap counts
-    /// once for each.
+    /// Negative if triangles face inwards. Meaningless for an open mesh. An overlap of shells counts once for each.
     pub fn signed_volume(&self) -> f64 {
         // Relative to the centre, so that the terms of a mesh far from the origin do not cancel.
         let origin = self.bounds().center();
         (0..self.triangles.len()).map(|triangle| tetrahedron_volume(self.corners(triangle), origin.into())).sum()
     }
 
-    /// Unit normal of a triangle, `Vec3::ZERO` where it is degenerate.
+    /// Unit normal of a triangle, `Vec3::ZERO` if it is degenerate.
     ///
     /// # Panics
     /// When there is no such triangle.
@@ -207,7 +207,7 @@ impl TriangleMesh {
         unit(doubled_normal(self.corners(triangle)))
     }
 
-    /// The same mesh with the triangles reversed for which `flip` says so; it is asked for each triangle's number.
+    /// The same mesh with those triangles reversed for whose number `flip` returns true.
     #[must_use]
     pub fn with_flipped(mut self, flip: impl Fn(usize) -> bool) -> Self {
         for (triangle, corners) in self.triangles.iter_mut().enumerate() {
@@ -223,7 +223,7 @@ impl TriangleMesh {
 pub(crate) fn is_degenerate(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    // NaN and a longest edge of 0 fail it too.
+    // NaN and a longest edge of 0 fail it, too.
     let has_area = (b - a).cross(c - a).length() > DEGENERATE_SHAPE * longest;
     !has_area
 }
@@ -234,13 +234,13 @@ pub(crate) fn doubled_normal(corners: [Vec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Signed volume of the tetrahedron between a triangle and `origin`, positive where the triangle faces away from it.
+/// Signed volume of the tetrahedron between a triangle and `origin`, positive if the triangle faces away from it.
 pub(crate) fn tetrahedron_volume(corners: [Vec3; 3], origin: Vec3) -> f64 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - origin.as_dvec3());
     a.dot(b.cross(c)) / 6.0
 }
 
-/// A vector at length 1, or zero.
+/// A vector scaled to length 1, or zero.
 pub(crate) fn unit(vector: DVec3) -> Vec3 {
     vector.try_normalize().map_or(Vec3::ZERO, |unit| unit.as_vec3())
 }

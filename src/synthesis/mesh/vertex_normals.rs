@@ -13,12 +13,12 @@ impl TriangleMesh {
         self.vertex_normals_with(&self.weld())
     }
 
-    /// [`vertex_normals`](Self::vertex_normals) with a welding at hand.
+    /// [`vertex_normals`](Self::vertex_normals) with an existing welding.
     pub fn vertex_normals_with(&self, welding: &Welding) -> Vec<Vec3> {
         at_once(self.vertex_normals_paced(welding, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn vertex_normals_paced(&self, welding: &Welding, pace: &Pace) -> Vec<Vec3> {
         let mut sums = vec![DVec3::ZERO; welding.count()];
         let add = |triangle: usize| {

@@ -4,12 +4,12 @@ use crate::synthesis::tree::{ByKind, VesselKind, VesselTree};
 use bevy_math::Vec3;
 use std::ops::Index;
 
-/// Where the roots of one kind of vessels are put.
+/// Placement of the roots of one kind of vessels.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum RootPlacement {
-    /// No root: vessels of this kind don't grow, unless from a given tree.
+    /// No root: vessels of this kind grow only from a given tree.
     #[default]
     None,
     /// This many roots, spread over the tissue, chosen by the seed. The first is where the tissue has an [entrance], if it
@@ -22,9 +22,9 @@ pub enum RootPlacement {
     /// As many roots as it takes for all tissue to be within this many [equivalent diameters] of one, measured along the
     /// tissue, chosen by the seed. A tissue with an [entrance] has its only root there.
     ///
-    /// Higher values give fewer roots, whose vessels have further to go. Step length, number of steps and growth of the
-    /// tissue decide how far a vessel comes: about 0.7 times as far as a straight one on a surface, 0.55 times in a volume.
-    /// A tissue of stages is measured in its first stage, in diameters of its last, to which lengths are fitted.
+    /// Higher values give fewer roots, whose vessels must grow further. Step length, number of steps and growth of the
+    /// tissue limit how far a vessel grows: about 0.7 times as far as a straight one on a surface, 0.55 times in a
+    /// volume. A staged tissue is measured in its first stage, in diameters of its last, to which lengths are fitted.
     ///
     /// Limits: at least [`Roots::LEAST_REACH`]. Usual: [`Roots::DEFAULT_REACH`].
     ///
@@ -40,7 +40,7 @@ pub enum RootPlacement {
     Exact(Vec<Vec3>),
 }
 
-/// Where the roots of each kind of vessels are put.
+/// Placements of the roots of each kind of vessels.
 ///
 /// The default is one artery, chosen by the seed, with a vein beside it; in a long organ several of them.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,12 +90,12 @@ impl Index<VesselKind> for RootPlacements {
     }
 }
 
-/// How all kinds of vessels begin.
+/// The roots and given trees of all kinds of vessels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Roots {
     /// Where roots are put.
     pub placed: RootPlacements,
-    /// Trees to go on growing from, besides the roots. An empty tree is none.
+    /// Trees from which growth continues, besides the roots. An empty tree counts as none.
     pub given: ByKind<Option<VesselTree>>,
 }
 
@@ -103,10 +103,10 @@ impl Roots {
     /// Most roots that are spread automatically.
     pub const MAX_SPREAD: u32 = 4096;
 
-    /// Largest distance of tissue from a root, measured along the tissue, in equivalent diameters. Discs, balls and surfaces
-    /// of balls have no point further from any other, so that one root is enough.
+    /// Largest distance of tissue from a root, measured along the tissue, in equivalent diameters. Discs, balls and
+    /// surfaces of balls have no points further apart, so one root is enough.
     pub const DEFAULT_REACH: f32 = 1.15;
-    /// Least value of that distance. Below it there are too few samples to measure by.
+    /// Least value of that distance. Below it there are too few samples to measure it.
     pub const LEAST_REACH: f32 = 0.1;
 }
 
@@ -119,9 +119,9 @@ impl From<RootPlacements> for Roots {
 /// The two lengths of a generator that the placement of its roots needs, in tissue lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RootSpacing {
-    /// Distance of a root from the root that it is put beside: the length of a segment. Two roots much nearer than this
-    /// coincide.
+    /// Distance of a root from the root beside which it is placed: the length of a segment. Two roots much nearer than
+    /// this coincide.
     pub step: f32,
-    /// Largest distance from the tissue of a root whose place is given exactly.
+    /// Largest distance from the tissue of a root with an exact place.
     pub reach: f32,
 }

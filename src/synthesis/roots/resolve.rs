@@ -20,7 +20,7 @@ impl Roots {
     /// The points at which each kind of vessels begins, without its given tree, on the tissue in force at step 1.
     ///
     /// # Errors
-    /// The first root that cannot be put where it was asked for, or given tree that is out of reach.
+    /// The first root that cannot be placed as requested, or given tree that is out of reach.
     pub fn resolve(
         &self,
         tissue: &dyn Tissue,
@@ -61,7 +61,7 @@ impl Roots {
         Ok(roots)
     }
 
-    /// The kinds in an order in which a kind comes before those that are put beside it.
+    /// The kinds, in an order with each kind before those placed beside it.
     fn order(&self) -> Result<impl Iterator<Item = VesselKind>, RootError> {
         let is_beside = |kind: VesselKind| self.placed[kind] == RootPlacement::Beside;
         if is_beside(VesselKind::Artery) && is_beside(VesselKind::Artery.companion()) {
@@ -72,7 +72,7 @@ impl Roots {
         Ok(order.into_iter())
     }
 
-    /// The roots of a kind, those of its given tree included.
+    /// The roots of a kind, including those of its given tree.
     fn neighbours(&self, tissue: &dyn Tissue, kind: VesselKind, roots: &ByKind<Vec<TissuePoint>>) -> Vec<TissuePoint> {
         let given = self.given[kind].iter().flat_map(|tree| tree.roots().map(|root| tree.positions()[root]));
         roots[kind].iter().copied().chain(given.map(|position| tissue.closest_point(position))).collect()

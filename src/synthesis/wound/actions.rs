@@ -14,7 +14,7 @@ use crate::synthesis::{
 };
 
 impl Wounds {
-    /// Severs every vessel that the blade crosses; a ball or capsule also takes out what lies within it.
+    /// Severs every vessel that the blade crosses; a ball or capsule also removes what lies within it.
     ///
     /// The blade is in the tree's space: see [`Blade::to_local`]. What counts as crossed is said at
     /// [`severed`]. Gaps are no vessel: what crosses one severs nothing there. How far the ends draw back, and what holds
@@ -37,7 +37,7 @@ impl Wounds {
         }
         let Plan { severed: places, mut changes, .. } = plan;
         self.hits = hits;
-        // In the order in which they were planned, where a segment has several.
+        // Several changes of one segment stay in the order of the plan.
         changes.sort_by_key(|&(node, _)| node);
         for of_segment in changes.chunk_by(|(a, _), (b, _)| a == b) {
             self.change(of_segment[0].0, |injury| {
@@ -60,7 +60,7 @@ impl Wounds {
     /// Takes a clamp off.
     ///
     /// # Errors
-    /// When it is not on.
+    /// If it is not on.
     pub fn unclamp(&mut self, clamp: ClampId, tree: &VesselTree) -> Result<WoundReport, WoundError> {
         let record = self.clamps.get(clamp.index as usize).filter(|record| record.generation == clamp.generation);
         let &Record { node, .. } = record.ok_or(WoundError::NoSuchClamp { clamp })?;
@@ -70,7 +70,7 @@ impl Wounds {
         if report.is_empty() { Err(WoundError::NoSuchClamp { clamp }) } else { Ok(report) }
     }
 
-    /// Ties a vessel off: a clamp that only undo takes off again.
+    /// Ties a vessel off: a clamp that only undo removes.
     ///
     /// # Errors
     /// A place that is not on a vessel of the tree, or in a gap.
@@ -78,8 +78,8 @@ impl Wounds {
         self.close(place, tree, ClosureKind::Tie)
     }
 
-    /// Seals by heat, within a ball or capsule, all vessels up to a calibre, for good: intact ones over the length that
-    /// lies within, and open ends that do. A cut through a sealed stretch opens nothing.
+    /// Permanently seals by heat, within a ball or capsule, all vessels up to a calibre: intact ones over their length
+    /// inside, and open ends inside. A cut through a sealed stretch opens nothing.
     ///
     /// `max_calibre` is the largest diameter that the instrument seals, in tissue lengths; infinity for any. Bipolar
     /// instruments are rated to 7 mm.
@@ -129,7 +129,7 @@ impl Wounds {
     }
 }
 
-/// Passes a place on a segment of the tree.
+/// Checks that a place is on a segment of the tree.
 fn check(place: Place, tree: &VesselTree) -> Result<(), WoundError> {
     let Place { node, along } = place;
     if node.index() >= tree.len() {

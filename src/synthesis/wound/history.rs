@@ -10,18 +10,18 @@ use crate::synthesis::{
 };
 
 impl Wounds {
-    /// Undoes the last action that changed anything; `None` where there is none.
+    /// Undoes the last action that changed anything; `None` if there is none.
     pub fn undo(&mut self, tree: &VesselTree) -> Option<WoundReport> {
         (!self.history.is_empty()).then(|| self.undo_last(1, tree))
     }
 
-    /// Undoes the last actions that changed anything, and reports what that changed in sum: all where they are fewer.
+    /// Undoes the last actions that changed anything, or all if there are fewer, and reports the combined changes.
     pub fn undo_last(&mut self, actions: usize, tree: &VesselTree) -> WoundReport {
         let mut report = WoundReport::default();
         let left = self.history.len().saturating_sub(actions);
         let Some(&first) = self.history.get(left) else { return report };
         let mut touched = self.before.split_off(first.before);
-        // Of what a segment was before several actions, the first counts: the order of these stays.
+        // If several actions changed a segment, its first previous state is used: the sort is stable.
         touched.sort_by_key(|&(node, _)| node);
         touched.dedup_by_key(|&mut (node, _)| node);
         for (node, before) in touched {
@@ -37,7 +37,7 @@ impl Wounds {
         report
     }
 
-    /// Undoes all actions, and reports what that changed in sum.
+    /// Undoes all actions, and reports the combined changes.
     pub fn undo_all(&mut self, tree: &VesselTree) -> WoundReport {
         let mut report = WoundReport::default();
         for (&node, injury) in &self.injuries {
@@ -47,7 +47,7 @@ impl Wounds {
         report
     }
 
-    /// Forgets everything, for another tree. The settings stay.
+    /// Clears everything, for another tree. The settings stay.
     pub fn clear(&mut self) {
         self.injuries.clear();
         self.ends.clear();
@@ -60,7 +60,7 @@ impl Wounds {
         Action { ends: self.ends.len(), clamps: self.clamps.len(), before: self.before.len() }
     }
 
-    /// Changes one segment. `change` says whether it did, and so does this.
+    /// Changes one segment. Like `change`, returns whether anything changed.
     pub(super) fn change(&mut self, node: u32, change: impl FnOnce(&mut Injury) -> bool) -> bool {
         let before = self.injuries.remove(&node).unwrap_or_default();
         let mut injury = before.clone();
@@ -74,7 +74,7 @@ impl Wounds {
         changed
     }
 
-    /// Ends an action: it counts if it changed anything.
+    /// Ends an action, which counts if it changed anything.
     pub(super) fn finish(&mut self, action: Action, tree: &VesselTree) -> WoundReport {
         let mut report = WoundReport::default();
         if self.before.len() == action.before {
@@ -89,7 +89,7 @@ impl Wounds {
         report
     }
 
-    /// Adds to a report what became of one segment.
+    /// Adds the changes of one segment to a report.
     fn compare(&self, tree: &VesselTree, node: u32, before: &Injury, now: &Injury, report: &mut WoundReport) {
         let [was_open, stays_open] = [before, now].map(|injury| {
             let mut open: Vec<u32> = injury.ends().filter(|end| end.is_open).map(|end| end.index).collect();

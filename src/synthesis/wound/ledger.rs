@@ -11,10 +11,10 @@ use crate::synthesis::{
 };
 use std::{collections::BTreeMap, ops::Range};
 
-/// All that was done to one tree.
+/// All wounds of one tree.
 ///
-/// The tree itself stays as it is: it may grow and move beneath, and every place keeps its share of its segment. All
-/// calls take the tree that the wounds belong to; after another one took its place, [`clear`](Self::clear).
+/// The tree itself is not changed. It may grow and move, and every place keeps its share of its segment. All calls take
+/// the tree that the wounds belong to; call [`clear`](Self::clear) after it was replaced.
 ///
 /// `candidates(region, visit)` is the index over the tree's segments: it calls `visit` with at least those that meet a
 /// region, as [`SegmentIndex::candidates_in`](crate::synthesis::segment_index::SegmentIndex::candidates_in) does. A cut
@@ -35,7 +35,7 @@ pub struct Wounds {
     pub(super) hits: Vec<Severed>,
 }
 
-/// An end or a clamp that was made, in the order of making.
+/// An end or a clamp, in the order of creation.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Record {
@@ -43,7 +43,7 @@ pub(super) struct Record {
     pub(super) generation: u32,
 }
 
-/// How long the ledger's lists were before an action.
+/// Lengths of the ledger's lists before an action.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Action {
     pub ends: usize,
@@ -61,12 +61,12 @@ impl Wounds {
         Ok(Self { retraction, ..Self::default() })
     }
 
-    /// How far ends draw back.
+    /// The retraction of ends.
     pub fn retraction(&self) -> Retraction {
         self.retraction
     }
 
-    /// Changes how far the ends of later cuts draw back.
+    /// Changes the retraction of the ends of later cuts.
     ///
     /// # Errors
     /// A value outside its limits.
@@ -81,8 +81,8 @@ impl Wounds {
         self.injuries.is_empty()
     }
 
-    /// Number of the last action that changed anything. It only rises, through undo and clear too, so that whatever
-    /// carries it can be told from what came later.
+    /// Number of the last action that changed anything. It only rises, even with undo and clear, so that it
+    /// distinguishes earlier from later things.
     pub fn generation(&self) -> u32 {
         self.generation
     }
@@ -92,7 +92,7 @@ impl Wounds {
         self.history.len()
     }
 
-    /// The severed end of an id, where it is now; `None` where it is gone.
+    /// The severed end with an id, at its present position; `None` if it no longer exists.
     pub fn end(&self, id: EndId, tree: &VesselTree) -> Option<SeveredEnd> {
         let record = self.ends.get(id.index as usize).filter(|record| record.generation == id.generation)?;
         let injury = self.injuries.get(&record.node)?;
@@ -100,7 +100,7 @@ impl Wounds {
         self.locate(tree, record.node, end)
     }
 
-    /// All severed ends, open or not, where they are now: in the order of the nodes, then from parent to node.
+    /// All severed ends, open or not, at their present positions: in the order of the nodes, then from parent to node.
     pub fn ends<'a>(&'a self, tree: &'a VesselTree) -> impl Iterator<Item = SeveredEnd> + 'a {
         let of_segment = move |(&node, injury): (&u32, &'a Injury)| {
             injury.ends().filter_map(move |end| self.locate(tree, node, end))
@@ -108,7 +108,7 @@ impl Wounds {
         self.injuries.iter().flat_map(of_segment)
     }
 
-    /// Where a clamp sits; `None` where it is no longer on.
+    /// The place of a clamp; `None` if it is no longer on.
     pub fn clamp_place(&self, clamp: ClampId) -> Option<Place> {
         let record = self.clamps.get(clamp.index as usize).filter(|record| record.generation == clamp.generation)?;
         let closures = self.injuries.get(&record.node)?.closures();
@@ -122,12 +122,12 @@ impl Wounds {
         self.injuries.values().flat_map(Injury::clamps).map(id)
     }
 
-    /// Whether every segment that something was done to is one of a tree's, so that this may be the ledger of that tree.
+    /// Whether every injured segment exists in a tree, so that this may be the ledger of that tree.
     pub fn fits(&self, tree: &VesselTree) -> bool {
         self.injuries.keys().all(|&node| segment(tree, NodeId(node)).is_some())
     }
 
-    /// What was done, without what it takes to undo it.
+    /// The wounds, without the undo history.
     #[must_use]
     pub fn without_history(&self) -> Self {
         let Self { retraction, generation, .. } = *self;
@@ -135,7 +135,7 @@ impl Wounds {
         Self { retraction, generation, injuries, ends, clamps, ..Self::default() }
     }
 
-    /// The segments that anything was done to, in the order of their nodes.
+    /// The injured segments, in the order of their nodes.
     pub fn injured(&self) -> impl Iterator<Item = NodeId> + '_ {
         self.injuries().map(|(node, _)| node)
     }
@@ -150,7 +150,7 @@ impl Wounds {
 
     pub(super) fn injuries_within(&self, nodes: Range<usize>) -> impl Iterator<Item = (NodeId, &Injury)> {
         let bound = |node: usize| u32::try_from(node).unwrap_or(u32::MAX);
-        // An empty range may lie anywhere: a map takes none that is the wrong way round.
+        // An empty range may be inverted, which a map does not accept.
         let nodes = bound(nodes.start)..bound(nodes.end.max(nodes.start));
         self.injuries.range(nodes).map(|(&node, injury)| (NodeId(node), injury))
     }
@@ -159,11 +159,11 @@ impl Wounds {
         EndId { index, generation: self.ends[index as usize].generation }
     }
 
-    /// A severed end as it lies in the tree; `None` where the tree has no such segment.
+    /// A severed end at its position in the tree; `None` if the tree has no such segment.
     pub(super) fn locate(&self, tree: &VesselTree, node: u32, end: End) -> Option<SeveredEnd> {
         let place = Place::new(NodeId(node), end.along);
         let [start, stop] = segment(tree, place.node)?;
-        // In f64, since a segment may be too short for the square of its length in f32.
+        // In f64, since the square of a short length may underflow in f32.
         let along = (stop.as_dvec3() - start.as_dvec3()).normalize_or_zero().as_vec3();
         Some(SeveredEnd {
             id: self.end_id(end.index),

@@ -1,4 +1,4 @@
-//! The ledger as it is written to files: what was done to a tree, without the history of undo.
+//! File form of the ledger: the wounds of a tree, without the undo history.
 
 use crate::synthesis::wound::{
     Retraction, WoundError, Wounds,
@@ -53,7 +53,7 @@ impl<'de> Deserialize<'de> for Wounds {
 }
 
 impl SavedWounds {
-    /// Passes what the ledger itself would write of a segment.
+    /// Checks that an injury is one that the ledger itself could write.
     fn check(&self, node: u32, injury: &Injury) -> Result<(), &'static str> {
         let is_listed =
             |list: &[Record], index: u32| list.get(index as usize).is_some_and(|record| record.node == node);

@@ -1,4 +1,4 @@
-//! Reading an organ's mesh from a file, by the ending of its name.
+//! Reading an organ's mesh from a file, by its extension.
 
 use super::{glb::read_glb, obj_read::read_obj_mesh, read::MeshReadError};
 use crate::synthesis::mesh::TriangleMesh;

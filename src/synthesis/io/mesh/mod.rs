@@ -1,4 +1,4 @@
-//! Files of meshes: organs are read, vessels are written as tubes.
+//! Mesh files: organs are read, vessels are written as tubes.
 
 #[cfg(feature = "mesh_files")]
 mod glb;

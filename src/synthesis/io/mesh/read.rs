@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Why a mesh could not be read from a file.
+/// The reason why a mesh could not be read from a file.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshReadError {
     /// The file, or one it refers to, cannot be read.
@@ -17,7 +17,7 @@ pub enum MeshReadError {
         /// What the system says.
         source: io::Error,
     },
-    /// A name that ends in none of the formats that are read.
+    /// An unsupported extension.
     #[error("cannot read {}: meshes are read from .glb, .gltf and .obj files", path.display())]
     UnknownFormat {
         /// The file.
@@ -41,14 +41,14 @@ pub enum MeshReadError {
     },
 }
 
-/// What went wrong while content was decoded, before the file's name is known.
+/// An error while decoding content, before the file's name is known.
 #[derive(Debug)]
 pub(super) enum Fault {
     /// A file that the content refers to cannot be read.
     Io(PathBuf, io::Error),
-    /// Anything about the content.
+    /// Any other error in the content.
     Content(String),
-    /// The mesh that was decoded.
+    /// An error in the decoded mesh.
     Mesh(MeshError),
 }
 

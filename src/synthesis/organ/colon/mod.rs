@@ -1,9 +1,10 @@
-//! The large intestine: a procedural colon with haustra, three taeniae coli and a lumen, another for every seed.
+//! The large intestine: a procedural colon with haustra, three taeniae coli and a lumen, different for every seed.
 //!
-//! The course (caecum with its appendix, ascending colon, hepatic flexure, transverse colon, splenic flexure, descending
-//! colon, sigmoid, rectum) is a spline that is kept off itself; the wall is swept along it. Between three longitudinal
-//! bands, the taeniae coli, the wall bulges into haustra; between two haustra a semilunar fold reaches into the lumen.
-//! The wall has a thickness. It ends blind in the caecum and is cut open at the rectum, so one can look in.
+//! The course (caecum with its appendix, ascending colon, hepatic flexure, transverse colon, splenic flexure,
+//! descending colon, sigmoid, rectum) is a spline that avoids itself; the wall is swept along it. Between three
+//! longitudinal bands, the taeniae coli, the wall bulges into haustra; between two haustra a semilunar fold reaches
+//! into the lumen. The wall has a thickness. It ends blind in the caecum and is cut open at the rectum, so the lumen is
+//! visible.
 //!
 //! The mesh is one closed surface of the topology of a sphere: from the blind end along the outside to the rim, and back
 //! along the inside. `u` runs around the tube from the mesenteric border, `v` along that way, so the chart has no
@@ -59,7 +60,7 @@ pub struct Colon {
     pub front: Viewpoint,
     /// From before the cut end into the lumen.
     pub rim: Viewpoint,
-    /// From within the lumen, along its straightest part: what an endoscope sees.
+    /// From within the lumen, along its straightest part: the view of an endoscope.
     pub lumen: Viewpoint,
 }
 
@@ -90,7 +91,7 @@ fn build(settings: &ColonSettings) -> Colon {
     let outer = profile(&wall, Side::Outer);
     let inner = profile(&wall, Side::Inner);
     let length = outer.length + inner.length;
-    // Squarish triangles: rings as far apart as columns are on average, a little closer to carry the folds.
+    // Nearly square cells: rings as far apart as columns on average, but a little closer for the folds.
     let columns = (0.5 * TAU * 0.5 * settings.calibre * settings.triangles as f32 / length).sqrt() / 3.0;
     let columns = (columns.round() as usize * 3).max(12);
     let rings = settings.triangles as usize / (2 * columns);
@@ -116,7 +117,7 @@ fn build(settings: &ColonSettings) -> Colon {
     describe(&wall, mesh, outer, inner)
 }
 
-/// The mean radius along one side, by the length of the wall that one walks.
+/// Arc length of the centre line as a function of the length along one side of the wall.
 struct Profile {
     /// Arc length of the centre line and length along the wall from the blind end, both ascending.
     samples: Vec<(f32, f32)>,
@@ -242,7 +243,7 @@ fn ring_vertices(wall: &Wall, ring: &Ring, angles: &[f32], pole: bool) -> Vec<(V
     vertices
 }
 
-/// Adds to a mesh what a scene needs beside it.
+/// Adds data for a scene to a mesh.
 fn describe(wall: &Wall, mesh: ShadedMesh, outer: Range<usize>, inner: Range<usize>) -> Colon {
     let (low, high) = mesh.bounds();
     let centre = 0.5 * (low + high);
@@ -278,7 +279,7 @@ fn lumen_view(wall: &Wall) -> Viewpoint {
         (straight * straight * straight * here.radius, here.centre, there.centre)
     });
     let best = candidates.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, Vec3::ZERO, Vec3::Y));
-    // Along a vertical limb the front of the body is at the top of the picture.
+    // In a vertical limb the front of the body is at the top of the picture.
     let level = (best.2 - best.1).normalize_or(Vec3::X).y.abs() < 0.8;
     Viewpoint { eye: best.1, target: best.2, up: if level { Vec3::Y } else { Vec3::Z } }
 }

@@ -3,13 +3,13 @@
 use crate::synthesis::organ::OrganSettingsError;
 use std::ops::RangeInclusive;
 
-/// What a colon looks like. The same settings give the same mesh, bit for bit.
+/// Settings of a colon. The same settings give the same mesh, bit for bit.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct ColonSettings {
-    /// Which colon: course, calibres, haustra and colours vary with it.
+    /// Chooses a colon: course, calibres, haustra and colours vary with it.
     ///
     /// Default: 0.
     pub seed: u64,
@@ -21,7 +21,7 @@ pub struct ColonSettings {
     pub width: f32,
     /// Mean outer diameter. The caecum is about a quarter wider, the descending colon and sigmoid a fifth narrower.
     ///
-    /// A calibre too large for the width is lowered where limbs would touch or bends close up.
+    /// A calibre too large for the width is lowered where limbs would touch or bends would close.
     ///
     /// Units: metres. Limits: 0.04 to 0.25 of the width. Default: [`Self::DEFAULT_CALIBRE`].
     pub calibre: f32,
@@ -51,7 +51,7 @@ pub struct ColonSettings {
     ///
     /// Default: true.
     pub appendix: bool,
-    /// Number of triangles aimed at; the mesh has within a tenth of it.
+    /// Target number of triangles; the mesh is within a tenth of it.
     ///
     /// Limits: 2,000 to 4,000,000. Default: [`Self::DEFAULT_TRIANGLES`].
     pub triangles: u32,
@@ -60,17 +60,17 @@ pub struct ColonSettings {
 impl ColonSettings {
     /// Within the 25 to 35 cm of an adult abdomen.
     pub const DEFAULT_WIDTH: f32 = 0.32;
-    /// Within the 4 to 7 cm that radiology texts give for a colon that is not distended.
+    /// Within the 4 to 7 cm of radiology texts for a colon that is not distended.
     pub const DEFAULT_CALIBRE: f32 = 0.052;
     /// Within the 1 to 3 mm of a wall on computed tomography.
     pub const DEFAULT_WALL_THICKNESS: f32 = 0.0028;
     /// About half the calibre.
     pub const DEFAULT_HAUSTRUM_LENGTH: f32 = 0.027;
-    /// Haustra as deep as they are drawn in anatomy texts.
+    /// The depth in drawings of anatomy texts.
     pub const DEFAULT_HAUSTRA_DEPTH: f32 = 1.0;
     /// Within the 6 to 12 mm of anatomy texts.
     pub const DEFAULT_TAENIA_WIDTH: f32 = 0.009;
-    /// As far as colons of adults differ without being remarkable.
+    /// The normal variation among adults' colons.
     pub const DEFAULT_VARIATION: f32 = 1.0;
     /// Enough for round folds in a picture of the whole organ.
     pub const DEFAULT_TRIANGLES: u32 = 80_000;

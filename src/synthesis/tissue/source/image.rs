@@ -16,12 +16,12 @@ pub struct TissueImage {
     pub values: Vec<f32>,
 }
 
-/// Which number of a coloured pixel is its value.
+/// The channel of a coloured pixel that gives its value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum ImageChannel {
-    /// The mean of red, green and blue: that of a grey picture itself.
+    /// The mean of red, green and blue, which is the value of a grey pixel itself.
     #[default]
     Grey,
     /// Red.
@@ -47,7 +47,7 @@ impl ImageChannel {
     }
 }
 
-/// How an image is read as tissue: every pixel or voxel of at least a threshold belongs to it.
+/// How an image is read as tissue: all pixels or voxels of at least a threshold belong to it.
 ///
 /// A flat picture stands upright, in the plane z = 0 unless the origin says otherwise, and is a surface; a volume is a solid.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,21 +55,21 @@ impl ImageChannel {
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct ImageTissue {
-    /// Least value of what is tissue.
+    /// Least value of tissue.
     ///
     /// Higher values leave less tissue.
     ///
     /// Units: those of the image; pictures hold 0 to 1. Default: [`Self::DEFAULT_THRESHOLD`].
     pub threshold: f32,
-    /// Whether what is below the threshold is the tissue, as in a drawing in black on white.
+    /// Whether values below the threshold are the tissue instead, as in a black drawing on white.
     ///
     /// Default: false.
     pub inverted: bool,
-    /// Which number of a coloured pixel is its value.
+    /// The channel of a coloured pixel that gives its value.
     ///
     /// Default: the mean of red, green and blue.
     pub channel: ImageChannel,
-    /// Size of a pixel or voxel; z is of no account for a flat picture.
+    /// Size of a pixel or voxel; z is ignored for a flat picture.
     ///
     /// Units: tissue lengths. Limits: each `> 0`. Default: 1.
     pub spacing: Vec3,
@@ -80,24 +80,25 @@ pub struct ImageTissue {
 }
 
 impl ImageTissue {
-    /// Least value of what is tissue: half of full white.
+    /// Default of [`threshold`](Self::threshold): half of full white.
     pub const DEFAULT_THRESHOLD: f32 = 0.5;
 
     /// The tissue in an image.
     ///
     /// # Errors
-    /// Values that are not one per pixel, or none that is tissue; a spacing that is not above 0; numbers that are not finite.
+    /// A number of values other than one per pixel, or no value that is tissue; a spacing that is not above 0; numbers
+    /// that are not finite.
     pub fn mask(&self, image: &TissueImage) -> Result<Mask, TissueError> {
         at_once(self.mask_paced(image, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`mask`](Self::mask).
     pub async fn mask_paced(&self, image: &TissueImage, pace: &Pace) -> Result<Mask, TissueError> {
         let threshold = finite("the threshold of the image", self.threshold)?;
-        // What is no number is no tissue either way.
+        // NaN is never tissue, inverted or not.
         let is_tissue = |value: f32| if self.inverted { value < threshold } else { value >= threshold };
         let cells = image.values.len();
         let mut inside: Vec<bool> = pace.part(0.0..0.2).collect(cells, |cell| is_tissue(image.values[cell])).await;
@@ -122,7 +123,7 @@ impl Default for ImageTissue {
     }
 }
 
-/// Puts the first row of a picture last. Cells that don't fill a row are left where they are, for others to complain of.
+/// Reverses the rows of a picture. Cells that don't fill a row stay where they are, and cause an error later.
 fn upside_down(cells: &mut [bool], width: usize) {
     if width > 0 && cells.len().is_multiple_of(width) {
         let rows = cells.len() / width;

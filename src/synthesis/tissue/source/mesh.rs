@@ -15,16 +15,16 @@ pub enum TissueMode {
     /// Over its surface.
     #[default]
     Surface,
-    /// Through what it encloses.
+    /// Through its inside.
     Volume,
-    /// Over its surface first, then inwards through what it encloses.
+    /// Over its surface first, then inwards through its inside.
     Staged {
         /// Steps on the surface, from the first on.
         surface_steps: u32,
     },
 }
 
-/// What to make of an organ's mesh. The default is its surface.
+/// The tissue to make from an organ's mesh. The default is its surface.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
@@ -34,7 +34,7 @@ pub struct MeshTissue {
     ///
     /// Default: over the surface.
     pub mode: TissueMode,
-    /// Voxels along the longest side of the organ, where its inside is needed.
+    /// Voxels along the longest side of the organ, if its inside is needed.
     ///
     /// Higher values take more memory and time to prepare; the boundary is that of the mesh at any resolution.
     ///
@@ -46,8 +46,8 @@ impl MeshTissue {
     /// Voxels along the longest side of the organ.
     pub const DEFAULT_RESOLUTION: u32 = MeshVolume::DEFAULT_RESOLUTION;
 
-    /// How much work it is to [prepare](Self::prepare) the tissue of so many triangles, in items: the triangles, and the
-    /// voxels where the inside is needed.
+    /// Work of [preparing](Self::prepare) the tissue of so many triangles, in items: the triangles, and the voxels if
+    /// the inside is needed.
     pub fn work(&self, triangles: usize) -> usize {
         let voxels = || (self.resolution as usize).saturating_pow(3);
         match self.mode {
@@ -56,15 +56,15 @@ impl MeshTissue {
         }
     }
 
-    /// Makes everything of a mesh's tissue that takes long.
+    /// Does the slow preparation of a mesh's tissue.
     ///
     /// # Errors
-    /// What is wrong with the settings, or with the mesh for this purpose: see [`TissueError`].
+    /// Invalid settings, or a mesh that cannot be used for this: see [`TissueError`].
     pub fn prepare(&self, mesh: impl Into<Arc<TriangleMesh>>) -> Result<PreparedTissue, TissueError> {
         at_once(self.prepare_paced(mesh.into(), &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`prepare`](Self::prepare).

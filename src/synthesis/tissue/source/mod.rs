@@ -1,4 +1,4 @@
-//! Where the tissue of an organ comes from, as data: what presets, the plugin and the command line hold.
+//! Sources of tissue, as data for presets, the plugin and the command line.
 
 mod image;
 mod mesh;
@@ -15,20 +15,20 @@ use crate::synthesis::{
 };
 use std::sync::Arc;
 
-/// Where the tissue of an organ comes from. The default is the surface of its mesh.
+/// The source of an organ's tissue. The default is the surface of its mesh.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum TissueSource {
     /// From the organ's mesh.
     Mesh(MeshTissue),
-    /// From nothing: it is a plain shape.
+    /// A plain shape, without other data.
     Shape(TissueShape),
-    /// From an image of it.
+    /// From an image of the organ.
     Image(ImageTissue),
 }
 
-/// What a source may need of an organ. What it doesn't need may be left out.
+/// The data of an organ that a source may need. Data that it doesn't need may be left out.
 #[derive(Clone, Debug, Default)]
 pub struct SourceData {
     /// The organ's mesh.
@@ -38,16 +38,16 @@ pub struct SourceData {
 }
 
 impl TissueSource {
-    /// Makes everything of the tissue that takes long.
+    /// Does the slow preparation of the tissue.
     ///
     /// # Errors
-    /// [`TissueError::NoMesh`] and [`TissueError::NoImage`] where that is needed and left out; what is wrong with the
-    /// settings, or with the organ for this purpose.
+    /// [`TissueError::NoMesh`] and [`TissueError::NoImage`] if that is needed but left out; invalid settings; an organ
+    /// that cannot be used for this.
     pub fn prepare(&self, data: &SourceData) -> Result<PreparedTissue, TissueError> {
         at_once(self.prepare_paced(data, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`prepare`](Self::prepare).
@@ -62,7 +62,7 @@ impl TissueSource {
         }
     }
 
-    /// How much work it is to [prepare](Self::prepare) the tissue of so many triangles, or pixels of an image, in items.
+    /// Work of [preparing](Self::prepare) the tissue of so many triangles, or pixels of an image, in items.
     pub fn work(&self, items: usize) -> usize {
         match self {
             Self::Mesh(mesh) => mesh.work(items),

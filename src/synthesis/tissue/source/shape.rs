@@ -15,7 +15,7 @@ pub enum TissueShape {
         /// Its centre. Default in files: the origin.
         #[cfg_attr(feature = "serialize", serde(default))]
         center: Vec3,
-        /// The direction it faces, of any length but 0. Default in files: z.
+        /// The direction that it faces, of any length except 0. Default in files: z.
         #[cfg_attr(feature = "serialize", serde(default = "upwards"))]
         normal: Vec3,
         /// Its radius. Limits: `> 0`.
