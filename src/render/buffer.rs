@@ -1,4 +1,4 @@
-//! What is drawn of a vessel entity.
+//! The drawn form of a vessel entity.
 //!
 //! In: a new entity with [`Vessels`]. Out: its [`SegmentBuffer`], empty at first, with a material of its own.
 
@@ -74,7 +74,7 @@ impl SegmentBuffer {
         self.capacity
     }
 
-    /// Whether it was given its colours.
+    /// Whether it has got its colours.
     pub(super) fn has_look(&self) -> bool {
         self.look.is_some()
     }

@@ -1,7 +1,7 @@
 //! The levels of detail at which segments can be drawn, finest first.
 //!
-//! In: the settings of the plugin, as a [`Detail`]. Out: [`Level`]s, each with its shape, what its vertices slide to and
-//! the size below which it serves.
+//! In: the settings of the plugin, as a [`Detail`]. Out: [`Level`]s, each with its shape, the goals of its vertices and
+//! the size below which it is drawn.
 
 use bevy::math::ops;
 use std::f32::consts::PI;

@@ -1,4 +1,4 @@
-//! How many segments a graphics device can draw.
+//! The number of segments that a graphics device can draw.
 
 use super::levels::FEWEST_SLOTS;
 use crate::synthesis::instances::SegmentInstance;

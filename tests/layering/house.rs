@@ -1,16 +1,16 @@
-//! Which file uses which: the files of `src` as a graph. A path is led through re-exports to the file that defines what
-//! it names, so that a `mod.rs` that only hands on the items of its children stands in nobody's way.
+//! The files of `src` as a graph of uses. A path is followed through re-exports to the file that defines its item, so
+//! that a `mod.rs` that only re-exports its children's items adds no circles.
 
 use crate::source::Source;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// More re-exports than this in a row lead in a circle.
+/// More re-exports than this in a row form a circle.
 const MOST_REEXPORTS: usize = 16;
 
 /// The files of `src`.
 pub struct House {
     pub sources: Vec<Source>,
-    /// For each file the others that it uses.
+    /// For each file, the others that it uses.
     pub uses: Vec<BTreeSet<usize>>,
 }
 
@@ -29,7 +29,7 @@ impl House {
         Self { sources, uses }
     }
 
-    /// Groups of files each of which uses all others of its group, directly or through others.
+    /// Groups of files, each of which uses all others of its group, directly or indirectly.
     pub fn circles(&self) -> Vec<Vec<usize>> {
         let reached: Vec<BTreeSet<usize>> = (0..self.sources.len()).map(|from| self.reached_from(from)).collect();
         let mut circles: Vec<Vec<usize>> = Vec::new();
@@ -62,7 +62,7 @@ impl House {
     }
 }
 
-/// The file that defines what a path names. `None` for other crates and for whole modules.
+/// The file that defines the item of a path. `None` for other crates and for whole modules.
 fn definer(
     sources: &[Source],
     modules: &BTreeMap<&[String], usize>,
@@ -72,7 +72,7 @@ fn definer(
     if path[0] != "crate" || reexports > MOST_REEXPORTS {
         return None;
     }
-    // As far as there are files for the path, they are its modules.
+    // The longest part of the path with a file is its module.
     let end = (1..=path.len()).rev().find(|&end| modules.contains_key(&path[1..end]))?;
     let name = path.get(end)?;
     let file = modules[&path[1..end]];

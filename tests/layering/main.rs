@@ -1,8 +1,8 @@
-//! Holds the source to the rules of the house (`ARCHITECTURE.md`): which room may use which, and what no file may do.
+//! Holds the source to the rules of the house (`ARCHITECTURE.md`): which room may use which, and what is forbidden.
 //!
 //! The rules are checked on the text of the source files, after comments, string literals and unit tests have been
-//! blanked out. That optional crates stay behind their features needs no check here: `cargo check
-//! --no-default-features` does not build otherwise.
+//! blanked out. Optional crates need no check here: `cargo check --no-default-features` fails if they are used without
+//! their features.
 
 mod house;
 mod rooms;

@@ -1,4 +1,4 @@
-//! Who may use whom: the pictures of `ARCHITECTURE.md` as tables, and the house held to them.
+//! The allowed uses: the pictures of `ARCHITECTURE.md` as tables, and their check.
 
 use crate::{house::House, project, sources};
 use std::{collections::BTreeSet, fs};
@@ -18,7 +18,7 @@ const FLOORS: &str = "
  ground         units  random  pace  parallel  space
 ";
 
-/// Rooms of the plugin, in the order of the data, each with the rooms that it uses. The ground serves all of them.
+/// Rooms of the plugin, in the order of the data, each with the rooms that it uses. All of them may use the ground.
 const PLUGIN: &str = "
  ground         order  lineage  announcer  job
  organ
@@ -30,7 +30,7 @@ const PLUGIN: &str = "
  scene          growth
 ";
 
-/// Files of the drawing, each with those that it uses.
+/// Files of `render`, each with those that it uses.
 const RENDER: &str = "
  levels
  limits         levels
@@ -44,7 +44,7 @@ const RENDER: &str = "
  segments       levels  limits  chunk  material  upload  detail  buffer
 ";
 
-/// A table: the name of each row, with what stands in it.
+/// A table: the name of each row, with its entries.
 type Table = Vec<(&'static str, Vec<&'static str>)>;
 
 fn table(text: &'static str) -> Table {
@@ -62,7 +62,7 @@ pub fn parts_below(part: &str) -> Vec<&'static str> {
     row.map_or_else(Vec::new, |(name, below)| [vec![name], below].concat())
 }
 
-/// All rooms of a part that has them.
+/// All rooms of a part with rooms.
 fn rooms(part: &str) -> Option<BTreeSet<&'static str>> {
     match part {
         "synthesis" => Some(table(FLOORS).into_iter().flat_map(|row| row.1).collect()),

@@ -1,4 +1,4 @@
-//! What no file may do, each file looked at alone. The last tests show that the checks can fail.
+//! Rules for single files. The last tests show that the checks can fail.
 
 use crate::{
     rooms::parts_below,
@@ -84,7 +84,7 @@ impl Source {
         found
     }
 
-    /// Which parts of the crate a part may use. Not what is named at the crate's top: `lib.rs` composes all parts.
+    /// The parts of the crate that a part may use. Items at the crate's top are excluded: `lib.rs` composes all parts.
     fn check_parts(&self, found: &mut Vec<String>) {
         let Some(part) = self.module.first() else { return };
         let rooms = parts_below(part);
@@ -127,7 +127,7 @@ fn every_file_keeps_the_rules_of_the_house() {
     let files = sources(&["src", "examples", "tests", "benches"]);
     assert!(files.len() > 20, "only {} files found", files.len());
     let mut report = String::new();
-    // The rules spell out what they look for.
+    // The rules contain the patterns that they look for.
     for file in files.iter().filter(|file| !file.path.starts_with("tests/layering/")) {
         for violation in file.violations() {
             report += &format!("{} {violation}\n", file.path);

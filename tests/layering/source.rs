@@ -1,4 +1,4 @@
-//! A source file, as the rules see it: its text without comments, literals and unit tests, and the paths it names.
+//! A source file for the rules: its text without comments, literals and unit tests, and the paths that it names.
 
 use std::collections::BTreeSet;
 
@@ -13,11 +13,11 @@ pub struct Source {
     pub text: String,
     /// The same without unit tests.
     pub code: String,
-    /// What it imports.
+    /// Its imports.
     pub uses: Vec<Use>,
     /// The code without imports.
     pub body: String,
-    /// Paths that are written out in the code, led back to `crate` or to another crate.
+    /// Paths in the code, resolved to `crate` or another crate.
     inline: Vec<Vec<String>>,
 }
 
@@ -25,7 +25,7 @@ pub struct Source {
 pub struct Use {
     /// Begins with `crate` or the name of another crate.
     pub path: Vec<String>,
-    /// The name that the file knows it by.
+    /// Its name in the file.
     pub name: String,
     /// Whether others can import it from here.
     pub is_public: bool,
@@ -51,12 +51,12 @@ impl Source {
         self.module.first().is_some_and(|first| first == room) && self.path.starts_with("src/")
     }
 
-    /// Every path that the file names, imported or written out.
+    /// Every path that the file names, in imports or in the code.
     pub fn paths(&self) -> impl Iterator<Item = &[String]> {
         self.uses.iter().map(|import| &import.path[..]).chain(self.inline.iter().map(Vec::as_slice))
     }
 
-    /// The same without what the file only hands on to others.
+    /// The same without pure re-exports.
     pub fn used_paths(&self) -> impl Iterator<Item = &[String]> {
         let named: BTreeSet<&str> = words(&self.body).into_iter().map(|(_, word)| word).collect();
         let is_used = move |import: &&Use| !import.is_public || named.contains(&*import.name);
@@ -180,7 +180,7 @@ fn imports(statements: &[Statement], module: &[String], modules: &[String]) -> V
     found
 }
 
-/// Every path written out in the code that leads to another file or crate.
+/// Every path in the code that leads to another file or crate.
 fn inline_paths(body: &str, module: &[String], modules: &[String], uses: &[Use]) -> Vec<Vec<String>> {
     let all = words(body);
     let mut found = Vec::new();
@@ -199,7 +199,7 @@ fn inline_paths(body: &str, module: &[String], modules: &[String], uses: &[Use])
             }
             path.push(pair[1].1.to_owned());
         }
-        // `clippy::…` names a lint. What begins with a capital letter and isn't imported is of this file.
+        // `clippy::…` names a lint. A capitalised name that isn't imported belongs to this file.
         let imported = uses.iter().find(|import| import.name == word);
         let is_crate_or_module =
             word.starts_with(|c: char| c.is_lowercase()) && word != "clippy" && !is_primitive(word);
@@ -239,7 +239,7 @@ struct Statement {
     is_public: bool,
 }
 
-/// Takes all `use` statements out of the code.
+/// Removes all `use` statements from the code.
 fn split_uses(code: &str) -> (Vec<Statement>, String) {
     let mut uses = Vec::new();
     let mut rest = String::new();
@@ -261,8 +261,8 @@ fn split_uses(code: &str) -> (Vec<Statement>, String) {
     (uses, rest)
 }
 
-/// Writes out the paths of one use tree, each with the name it is known by: `a::{b, c::d as e}` gives `a::b`, known as
-/// `b`, and `a::c::d`, known as `e`.
+/// Expands the paths of one use tree, each with its local name: `a::{b, c::d as e}` gives `a::b` as `b`, and `a::c::d`
+/// as `e`.
 fn expand(tree: &str, prefix: &[String], found: &mut Vec<(Vec<String>, String)>) {
     let tree = tree.trim().trim_start_matches("::");
     if let Some(group) = tree.strip_prefix('{') {

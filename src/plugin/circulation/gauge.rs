@@ -1,4 +1,4 @@
-//! When the supply of an organ is measured, and with what.
+//! Schedules the measurements of an organ's supply.
 
 use crate::plugin::{
     circulation::organ_flow::{Measured, SupplyGauge},

@@ -118,7 +118,7 @@ pub(crate) struct OrganFlow {
 }
 
 impl OrganFlow {
-    /// The flow in the intact vessels. `links` join arteries and veins; none leave each to itself.
+    /// The flow in the intact vessels. `links` join arteries and veins; without links they stay separate.
     pub(crate) async fn new(
         trees: Trees,
         hydraulics: &Hydraulics,

@@ -1,4 +1,4 @@
-//! Organs with blood and their vessels, as the systems of the circulation find them.
+//! Queries of organs with blood and of their vessels.
 
 use crate::plugin::{
     announcer::Announcer,

@@ -1,4 +1,4 @@
-//! The flow in an organ's vessels, as it is kept from frame to frame.
+//! The flow in an organ's vessels, kept between frames.
 
 use crate::plugin::{
     circulation::{

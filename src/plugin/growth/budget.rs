@@ -120,7 +120,7 @@ impl Costs {
         self.settling += cost;
     }
 
-    /// Takes in the cost of publishing the steps done since the last time.
+    /// Records the cost of publishing the steps since the last time.
     pub(crate) fn note_publishing(&mut self, cost: Duration) {
         let cost = cost + std::mem::take(&mut self.settling);
         if let Some(each) = cost.checked_div(std::mem::take(&mut self.unpublished)) {

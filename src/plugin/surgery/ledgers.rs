@@ -1,4 +1,4 @@
-//! The ledgers that record what was done to an organ's vessels.
+//! The ledgers that record the wounds of an organ's vessels.
 //!
 //! In: [`Cuttable`] on an organ. Out: [`VesselWounds`] on each of its vessel entities, which a regrowth clears.
 

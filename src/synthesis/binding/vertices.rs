@@ -8,7 +8,7 @@ use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
 use crate::synthesis::{pace::Pace, parallel};
 use bevy_math::{Vec3, Vec3A};
 
-/// Fewest triangles, vertices, or fours of nodes, worth handing to another thread.
+/// Fewest triangles, vertices, or groups of four nodes, worth handing to another thread.
 pub(super) const WORTH_SHARING: usize = 2048;
 
 /// A vertex of a deformed organ. Position and normal are stored together, since nodes read both at random vertices.

@@ -1,4 +1,4 @@
-//! What a step did, in numbers.
+//! Reports of steps.
 
 /// Report of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

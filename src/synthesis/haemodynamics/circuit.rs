@@ -1,8 +1,8 @@
-//! A tree of resistances, and what hangs off its nodes, summed from the tips to the roots.
+//! A tree of resistances with shunts at its nodes, summed from the tips to the roots.
 //!
-//! There are two slots more than the tree has nodes: slot 0 is the reference, held at the bed's pressure, from which
-//! pressures are counted; slot 1 is the source, held at the root pressure, and the parent of every root. So every slot has
-//! one above it, and no loop asks whether a node is a root or cut off.
+//! There are two slots more than the tree has nodes: slot 0 is the reference, held at the bed's pressure, to which
+//! pressures are relative; slot 1 is the source, held at the root pressure, and the parent of every root. So every
+//! node's slot has one above it, and no loop tests whether a node is a root or cut off.
 
 use crate::synthesis::{
     pace::{Pace, STRETCH},
@@ -62,7 +62,7 @@ pub(super) struct Slot {
     pub pressure: f64,
 }
 
-/// The slots of a tree: each a segment and the node that it ends in. One that is new has to be [cleared](Self::clear).
+/// The slots of a tree: each is a segment with its end node. A new circuit must be [cleared](Self::clear).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Circuit {
     pub links: Vec<Link>,
@@ -74,7 +74,7 @@ pub(super) struct Circuit {
 }
 
 impl Circuit {
-    /// Forgets all nodes: the reference and the source are left.
+    /// Removes all nodes, except the reference and the source.
     pub fn clear(&mut self) {
         self.links.clear();
         self.links.resize(FIRST, Link::default());
@@ -86,7 +86,7 @@ impl Circuit {
         }
     }
 
-    /// Adds a node below a slot. Its segment resists nothing and no bed is below it yet.
+    /// Adds a node below a slot. Its segment has no resistance yet, and there is no bed below it.
     pub fn push(&mut self, parent: u32) {
         let slot = self.links.len() as u32;
         let next_sibling = std::mem::replace(&mut self.links[parent as usize].first_child, slot);

@@ -1,4 +1,4 @@
-//! What a cut or a clamp makes of a segment.
+//! The effect of a cut or a clamp on a segment.
 
 use super::FlowError;
 

@@ -106,7 +106,7 @@ impl NetworkEnd {
         self.piece = piece;
     }
 
-    /// Adds what it draws to the shunt of its node.
+    /// Adds its draw to the shunt of its node.
     fn draw_from(&self, circuit: &mut Circuit) {
         let shunt = &mut circuit.shunts[self.attached as usize];
         shunt.y += self.stump.y;
@@ -210,7 +210,7 @@ impl OpenEnds {
         self.list[index].opening = share;
     }
 
-    /// Traces the skeleton again if needed. The circuit's sums must be right.
+    /// Traces the skeleton again if needed. The circuit's sums must be up to date.
     pub fn trace(&mut self, circuit: &Circuit) {
         if !std::mem::take(&mut self.is_untraced) {
             return;
@@ -299,8 +299,8 @@ impl OpenEnds {
         }
     }
 
-    /// Takes the flows that follow from the pressures of a linearised solution, which are above that outside and exact
-    /// to `rounding`. Returns the largest change of a flow, in units of the tolerance.
+    /// Takes the flows from the pressures of a linearised solution, which are relative to that outside and exact to
+    /// `rounding`. Returns the largest change of a flow, in units of the tolerance.
     pub fn accept(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, rounding: f64, damped: bool) -> f64 {
         let largest = self.list.iter().map(|end| end.flow).fold(0.0, f64::max);
         let mut residual = 0.0_f64;
@@ -335,7 +335,7 @@ impl OpenEnds {
         }
     }
 
-    /// Puts the flows into the sums of the circuit, where that is due.
+    /// Adds the flows to the sums of the circuit if needed.
     pub fn add_to_sums(&mut self, circuit: &mut Circuit) {
         if !std::mem::take(&mut self.is_unloaded) {
             return;
@@ -346,7 +346,7 @@ impl OpenEnds {
         }
     }
 
-    /// Puts what the ends draw into the shunts of their nodes.
+    /// Adds the draw of the ends to the shunts of their nodes.
     pub fn load(&self, circuit: &mut Circuit) {
         for end in &self.list {
             circuit.shunts[end.attached as usize] = circuit.beds[end.attached as usize];
@@ -356,8 +356,8 @@ impl OpenEnds {
         }
     }
 
-    /// Puts into the shunts of some slots, which rise, what leaves their nodes and is no child: the bed, and the ends as of
-    /// the last solution.
+    /// Sets the shunts of some slots, in rising order: all that leaves their nodes except children, that is, the bed,
+    /// and the ends as of the last solution.
     pub fn load_at(&self, slots: &[u32], circuit: &mut Circuit) {
         for &slot in slots {
             circuit.shunts[slot as usize] = circuit.beds[slot as usize];

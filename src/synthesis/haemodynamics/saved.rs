@@ -1,4 +1,4 @@
-//! Bleeding and blood as they are written to files, and read with every number within its limits.
+//! File forms of bleeding and blood. Reading checks every number against its limits.
 
 use crate::synthesis::{
     haemodynamics::{Bleeding, BleedingEnd, BleedingSettings, BloodVolume, BloodVolumeSettings, FlowError},

@@ -1,4 +1,4 @@
-//! Where a line crosses a triangle.
+//! Crossings of lines with triangles.
 
 use bevy_math::DVec2;
 

@@ -1,4 +1,4 @@
-//! What a user says of where vessels enter, and what a generator says of the room that they need.
+//! The user's placements of roots, and the generator's spacing.
 
 use crate::synthesis::tree::{ByKind, VesselKind, VesselTree};
 use bevy_math::Vec3;
@@ -12,14 +12,14 @@ pub enum RootPlacement {
     /// No root: vessels of this kind grow only from a given tree.
     #[default]
     None,
-    /// This many roots, spread over the tissue, chosen by the seed. The first is where the tissue has an [entrance], if it
-    /// has one.
+    /// This many roots, spread over the tissue, chosen by the seed. The first is at the tissue's [entrance], if it has
+    /// one.
     ///
     /// Limits: at most [`Roots::MAX_SPREAD`].
     ///
     /// [entrance]: crate::synthesis::tissue::Tissue::entrance
     Spread(u32),
-    /// As many roots as it takes for all tissue to be within this many [equivalent diameters] of one, measured along the
+    /// As many roots as needed for all tissue to be within this many [equivalent diameters] of one, measured along the
     /// tissue, chosen by the seed. A tissue with an [entrance] has its only root there.
     ///
     /// Higher values give fewer roots, whose vessels must grow further. Step length, number of steps and growth of the

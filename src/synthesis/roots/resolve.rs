@@ -1,4 +1,4 @@
-//! From what a user says to points of the tissue.
+//! From placements of roots to points of the tissue.
 
 use super::{
     RootError, RootPlacement, RootSpacing, Roots,

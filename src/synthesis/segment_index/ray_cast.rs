@@ -62,7 +62,7 @@ impl RayCast {
     /// without false negatives.
     ///
     /// # Panics
-    /// If the node is not of the tree.
+    /// If the node is not in the tree.
     pub fn may_meet(&self, tree: &VesselTree, node: NodeId) -> bool {
         RoundCone::of(tree, node.0).is_some_and(|cone| {
             let (center, radius) = cone.ball_around();

@@ -54,11 +54,11 @@ impl PreparedTissue {
         Ok(Self { stages: Vec::new(), last: Arc::clone(&tissue), plain: tissue, canvas: None })
     }
 
-    /// The tissues of a mesh: stages, each for a number of steps, and the last. `indexed` is empty where none of them needs an
-    /// index of the triangles.
+    /// The tissues of a mesh: stages, each for a number of steps, and the last. `indexed` is empty if none of them
+    /// needs an index of the triangles.
     ///
     /// # Errors
-    /// Tissues that make up no [`Staged`] one.
+    /// Tissues that cannot form a [`Staged`] one.
     pub(super) fn of_mesh(
         mesh: Arc<TriangleMesh>,
         indexed: OnceLock<IndexedMesh>,

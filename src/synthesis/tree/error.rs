@@ -1,4 +1,4 @@
-//! What can be wrong with a tree.
+//! Errors of trees.
 
 use bevy_math::Vec3;
 

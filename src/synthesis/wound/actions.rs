@@ -1,4 +1,4 @@
-//! What is done to vessels: they are cut, clamped, tied and sealed.
+//! Actions on vessels: cut, clamp, tie and seal.
 
 use crate::synthesis::{
     segment_index::{Region, SegmentSearch},

@@ -1,4 +1,4 @@
-//! Actions on a ledger: how each begins and ends, and how it is undone.
+//! The history of a ledger: how actions begin and end, and their undo.
 
 use crate::synthesis::{
     tree::{NodeId, VesselTree},

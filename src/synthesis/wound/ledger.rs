@@ -1,4 +1,4 @@
-//! The ledger of what was done to one tree: what it holds, and what it tells.
+//! The ledger of wounds of one tree: its contents and queries.
 
 use crate::synthesis::{
     haemodynamics::EndSide,
@@ -18,7 +18,7 @@ use std::{collections::BTreeMap, ops::Range};
 ///
 /// `candidates(region, visit)` is the index over the tree's segments: it calls `visit` with at least those that meet a
 /// region, as [`SegmentIndex::candidates_in`](crate::synthesis::segment_index::SegmentIndex::candidates_in) does. A cut
-/// asks more of it, which the same closure answers: see
+/// makes further queries, which the same closure answers: see
 /// [`SegmentSearch`](crate::synthesis::segment_index::SegmentSearch).
 #[derive(Clone, Debug, Default)]
 pub struct Wounds {
@@ -28,10 +28,10 @@ pub struct Wounds {
     pub(super) ends: Vec<Record>,
     pub(super) clamps: Vec<Record>,
     pub(super) history: Vec<Action>,
-    /// What the segments touched by these actions were before, in order.
+    /// Previous states of the segments that these actions changed, in order.
     pub(super) before: Vec<(u32, Injury)>,
     pub(super) generation: u32,
-    /// What the last cut crossed: memory for the next.
+    /// Crossings of the last cut, kept as memory for the next.
     pub(super) hits: Vec<Severed>,
 }
 

@@ -1,4 +1,4 @@
-//! What readers of all formats share: the bytes of a file, and why it cannot be read.
+//! Shared by readers of all formats: the bytes of a file, and errors.
 
 use crate::synthesis::mesh::MeshError;
 use std::{

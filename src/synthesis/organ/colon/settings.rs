@@ -1,4 +1,4 @@
-//! Which colons there are.
+//! Settings of colons.
 
 use crate::synthesis::organ::OrganSettingsError;
 use std::ops::RangeInclusive;

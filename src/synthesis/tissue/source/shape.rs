@@ -1,4 +1,4 @@
-//! Tissue of simple shape.
+//! Tissues of simple shape.
 
 use crate::synthesis::tissue::{Ball, Cuboid, Disc, Ellipsoid, Rectangle, Tissue, TissueError};
 use bevy_math::Vec3;
