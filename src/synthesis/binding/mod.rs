@@ -183,7 +183,7 @@ impl Binding {
     /// Unit length; `Vec3::ZERO` if the organ has collapsed there, and for a node bound to tetrahedra.
     ///
     /// # Panics
-    /// When the node is not bound.
+    /// If the node is not bound.
     pub fn normal(&self, node: usize) -> Vec3 {
         match &self.bonds {
             Bonds::Surface(bonds) => bonds.normal(node),

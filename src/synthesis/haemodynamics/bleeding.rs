@@ -159,7 +159,7 @@ impl Bleeding {
     /// The bleeding of a tree that has lost nothing.
     ///
     /// # Errors
-    /// When a setting is outside its limits.
+    /// If a setting is outside its limits.
     pub fn new(settings: BleedingSettings) -> Result<Self, FlowError> {
         settings.validate()?;
         Ok(Self { settings, ..Self::default() })
@@ -171,7 +171,7 @@ impl Bleeding {
     /// and the openings of its ends. Then the open ends are solved; call [`Network::solve`] for all pressures.
     ///
     /// # Errors
-    /// When the time is negative, not a number or above [`Self::LONGEST_TIME`], or the flow did not converge.
+    /// If the time is negative, NaN or above [`Self::LONGEST_TIME`], or the flow did not converge.
     pub fn step(&mut self, network: &mut Network, seconds: f64, blood: &mut BloodVolume) -> Result<(), FlowError> {
         let parts = self.begin(network, seconds)?;
         for _ in 0..parts {

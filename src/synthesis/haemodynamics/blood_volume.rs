@@ -88,7 +88,7 @@ impl BloodVolume {
     /// The blood of a patient who has lost none.
     ///
     /// # Errors
-    /// When a setting is outside its limits.
+    /// If a setting is outside its limits.
     pub fn new(settings: BloodVolumeSettings) -> Result<Self, FlowError> {
         settings.validate()?;
         Ok(Self { settings, lost: 0.0 })

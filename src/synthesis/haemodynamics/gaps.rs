@@ -23,7 +23,7 @@ impl Network {
     /// [opening](Self::set_opening).
     ///
     /// # Errors
-    /// When there is no such node, it is a root, or a number is outside its limits.
+    /// If there is no such node, it is a root, or a number is outside its limits.
     pub fn set_interruption(&mut self, node: NodeId, interruption: Option<Interruption>) -> Result<(), FlowError> {
         let parent = self.check_gap(node, interruption.as_ref())?;
         let slot = node_slot(node.index());
@@ -144,10 +144,10 @@ impl Network {
     /// `index` is the end's place in [`open_ends`](Self::open_ends).
     ///
     /// # Errors
-    /// When `share` is not from 0 to 1.
+    /// If `share` is not from 0 to 1.
     ///
     /// # Panics
-    /// When there are not that many open ends.
+    /// If there are not that many open ends.
     pub fn set_opening(&mut self, index: usize, share: f64) -> Result<(), FlowError> {
         FlowError::check_share("the opening of an end", share)?;
         self.ends.set_opening(index, share);

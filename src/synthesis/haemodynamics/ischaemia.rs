@@ -29,10 +29,10 @@ impl Supply {
     /// Make it again after the tree has grown.
     ///
     /// # Errors
-    /// When the intact network can't be solved.
+    /// If the intact network can't be solved.
     ///
     /// # Panics
-    /// When the network is of another tree.
+    /// If the network is that of another tree.
     pub fn new(tree: &VesselTree, network: &Network) -> Result<Self, FlowError> {
         let mut intact = network.clone();
         intact.set_interruptions(&[])?;
@@ -46,7 +46,7 @@ impl Supply {
     /// this before the first wound.
     ///
     /// # Panics
-    /// When the network is of another tree.
+    /// If the network is that of another tree.
     pub fn against(tree: &VesselTree, intact: &Network) -> Self {
         at_once(Self::against_paced(tree, intact, &Pace::default()))
     }
@@ -54,7 +54,7 @@ impl Supply {
     /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Panics
-    /// When the network is of another tree.
+    /// If the network is that of another tree.
     pub async fn against_paced(tree: &VesselTree, intact: &Network, pace: &Pace) -> Self {
         let mut flows: Vec<f64> = pace.collect(tree.len(), |node| intact.bed_flow(node)).await;
         tree.fold_to_roots(&mut flows, |parent, child| *parent += child);
@@ -67,7 +67,7 @@ impl Supply {
     /// never fed a terminal counts as supplied.
     ///
     /// # Panics
-    /// When tree or network have another number of nodes than when this was made.
+    /// If tree or network have a different number of nodes than when this was made.
     pub fn update(&mut self, tree: &VesselTree, network: &Network) {
         at_once(self.update_paced(tree, network, &Pace::default()));
     }
@@ -75,7 +75,7 @@ impl Supply {
     /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Panics
-    /// When tree or network have another number of nodes than when this was made.
+    /// If tree or network have a different number of nodes than when this was made.
     pub async fn update_paced(&mut self, tree: &VesselTree, network: &Network, pace: &Pace) {
         let Self { intact, sums, segments } = self;
         assert_eq!(intact.len(), network.len(), "one network, that the supply was made for");
@@ -100,7 +100,7 @@ impl Supply {
     /// 0 to 1, and 0 for a tree without terminals.
     ///
     /// # Panics
-    /// When the tree has another number of nodes than when this was made.
+    /// If the tree has a different number of nodes than when this was made.
     pub fn ischaemic_share(&self, tree: &VesselTree, threshold: f32) -> f32 {
         let (mut all, mut lacking) = (0.0, 0.0);
         for node in tree.tips() {
@@ -204,7 +204,7 @@ impl TissueSupply {
     /// Takes over the supply of all segments, from [`Supply::segments`].
     ///
     /// # Panics
-    /// When there are fewer segments than when this was made.
+    /// If there are fewer segments than when this was made.
     pub fn update(&mut self, segments: &[f32]) {
         for (vertex, sources) in self.vertices.iter_mut().zip(&self.sources) {
             let lacking: f32 = sources
@@ -226,7 +226,7 @@ impl TissueSupply {
     /// `areas` gives the amount of tissue of each vertex, in any unit. Without it all count alike.
     ///
     /// # Panics
-    /// When there are areas, and not one per vertex.
+    /// If the number of areas differs from that of vertices.
     pub fn ischaemic_share(&self, threshold: f32, areas: Option<&[f32]>) -> f32 {
         assert!(areas.is_none_or(|areas| areas.len() == self.vertices.len()), "one area per vertex");
         let area = |vertex: usize| areas.map_or(1.0, |areas| f64::from(areas[vertex]));

@@ -53,7 +53,7 @@ impl Circulation {
     /// The veins' bed gets the resistance of the arteries', which is that of each link.
     ///
     /// # Errors
-    /// When a node is not of its network, or the arteries' bed has no resistance.
+    /// If a node is not in its network, or the arteries' bed has no resistance.
     pub fn new(arterial: Network, venous: Network, links: &[BedLink]) -> Result<Self, FlowError> {
         at_once(Self::new_paced(arterial, venous, links, &Pace::default()))
     }
@@ -80,7 +80,7 @@ impl Circulation {
     /// Replaces the links, for example after growth: update both networks first.
     ///
     /// # Errors
-    /// When a node is not of its network. The links are unchanged then.
+    /// If a node is not in its network. The links are unchanged then.
     pub fn set_links(&mut self, links: &[BedLink]) -> Result<(), FlowError> {
         at_once(self.set_links_paced(links, &Pace::default()))
     }
@@ -143,7 +143,7 @@ impl Circulation {
     /// are about five times as many passes, fewer if little has changed since the last time.
     ///
     /// # Errors
-    /// When one of the iterations did not converge.
+    /// If one of the iterations did not converge.
     pub fn solve(&mut self) -> Result<(), FlowError> {
         at_once(self.solve_paced(&Pace::default()))
     }

@@ -63,7 +63,7 @@ impl Network {
     /// The network of a tree, not solved yet, at the mean of the root pressure.
     ///
     /// # Errors
-    /// When the tree is not well formed, or a setting is outside its limits.
+    /// If the tree is not well formed, or a setting is outside its limits.
     pub fn new(tree: &VesselTree, settings: FlowSettings) -> Result<Self, FlowError> {
         at_once(Self::new_paced(tree, settings, &Pace::default()))
     }
@@ -101,7 +101,7 @@ impl Network {
     /// Follows a tree that grew, whose radii changed or whose nodes moved. Only changes are computed again.
     ///
     /// # Errors
-    /// When a number of the tree is not finite, or a radius not above 0. The network is unchanged then.
+    /// If a number of the tree is not finite, or a radius not above 0. The network is unchanged then.
     pub fn update(&mut self, tree: &VesselTree) -> Result<NetworkUpdate, FlowError> {
         tree.validate()?;
         let before = self.len();
@@ -269,7 +269,7 @@ impl Network {
     /// Holds all roots at a pressure from now on.
     ///
     /// # Errors
-    /// When the pressure is not finite.
+    /// If the pressure is not finite.
     pub fn set_root_pressure(&mut self, pressure: Pressure) -> Result<(), FlowError> {
         FlowError::check_finite("the root pressure in mmHg", pressure.mmhg())?;
         self.source = pressure.pascals() - self.bed;
@@ -280,7 +280,7 @@ impl Network {
     /// Holds the bed's pool at a pressure from now on, other than that of the settings.
     ///
     /// # Errors
-    /// When the pressure is not finite.
+    /// If the pressure is not finite.
     pub fn set_bed_pressure(&mut self, pressure: Pressure) -> Result<(), FlowError> {
         FlowError::check_finite("the bed's pressure in mmHg", pressure.mmhg())?;
         self.source += self.bed - pressure.pascals();

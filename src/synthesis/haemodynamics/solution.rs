@@ -27,7 +27,7 @@ impl Network {
     /// the node is no terminal.
     ///
     /// # Panics
-    /// When the node is not of this network.
+    /// If the node is not in this network.
     pub fn bed_flow(&self, node: usize) -> f64 {
         let bed = self.circuit.beds[node + FIRST];
         bed.y * self.circuit.slots[node + FIRST].pressure - bed.s
@@ -36,7 +36,7 @@ impl Network {
     /// Resistance of a node's segment while it is whole, in Pa·s/m³; 0 for a root.
     ///
     /// # Panics
-    /// When the node is not of this network.
+    /// If the node is not in this network.
     pub fn resistance(&self, node: usize) -> f64 {
         self.whole_resistance(node)
     }
@@ -59,7 +59,7 @@ impl Network {
     /// Mean velocity in a segment in m/s, as of the last solution, with the sign of its flow.
     ///
     /// # Panics
-    /// When the node is not of this network.
+    /// If the node is not in this network.
     pub fn velocity(&self, node: usize) -> f64 {
         let radius = self.settings.scale.to_metres(self.radii[node]);
         self.flows[node] / (std::f64::consts::PI * radius * radius)
@@ -68,7 +68,7 @@ impl Network {
     /// Shear stress at a segment's wall in Pa, as of the last solution: 4µ|Q|/(πr³).
     ///
     /// # Panics
-    /// When the node is not of this network.
+    /// If the node is not in this network.
     pub fn wall_shear_stress(&self, node: usize) -> f64 {
         let radius = self.settings.scale.to_metres(self.radii[node]);
         // 8µ/(πr⁴)·r/2 is 4µ/(πr³).

@@ -14,7 +14,7 @@ impl Network {
     /// Brings pressures and flows of all nodes up to date.
     ///
     /// # Errors
-    /// When the flow through the open ends did not converge.
+    /// If the flow through the open ends did not converge.
     pub fn solve(&mut self) -> Result<(), FlowError> {
         at_once(self.solve_paced(&Pace::default()))
     }
@@ -38,7 +38,7 @@ impl Network {
     /// itself has changed.
     ///
     /// # Errors
-    /// When the flow through the open ends did not converge.
+    /// If the flow through the open ends did not converge.
     pub fn settle(&mut self) -> Result<(), FlowError> {
         self.solve_ends()?;
         self.ends.add_to_sums(&mut self.circuit);
@@ -48,7 +48,7 @@ impl Network {
     /// Brings only the flow at open ends up to date, but no sums or other pressures.
     ///
     /// # Errors
-    /// When it did not converge.
+    /// If it did not converge.
     pub fn solve_ends(&mut self) -> Result<(), FlowError> {
         if std::mem::take(&mut self.sums_stale) {
             at_once(self.circuit.sum_all(&Pace::default()));
@@ -60,7 +60,7 @@ impl Network {
     /// Pressure of one node, found along its path to the root.
     ///
     /// # Errors
-    /// When there is no such node, or the flow through the open ends did not converge.
+    /// If there is no such node, or the flow through the open ends did not converge.
     pub fn pressure_at(&mut self, node: NodeId) -> Result<Pressure, FlowError> {
         self.check(node)?;
         self.settle()?;

@@ -37,7 +37,7 @@ impl IndexedMesh {
     /// The value at a point of the mesh, given one value for each vertex: linear over each triangle.
     ///
     /// # Panics
-    /// When there are fewer values than vertices.
+    /// If there are fewer values than vertices.
     pub fn value_at(&self, point: &SurfacePoint, values: &[f32]) -> f32 {
         let corners = self.mesh.triangles()[point.triangle].map(|vertex| values[vertex as usize]);
         Vec3::from_array(corners).dot(point.barycentric)
@@ -46,7 +46,7 @@ impl IndexedMesh {
     /// The value at the point of the mesh nearest to `point`; `None` if that is not finite.
     ///
     /// # Panics
-    /// When there are fewer values than vertices.
+    /// If there are fewer values than vertices.
     pub fn value_near(&self, point: Vec3, values: &[f32]) -> Option<f32> {
         self.index.closest(point).map(|found| self.value_at(&found, values))
     }

@@ -119,7 +119,7 @@ impl TetMesh {
     /// Whether a tetrahedron has no significant volume.
     ///
     /// # Panics
-    /// When there is no such tetrahedron.
+    /// If there is no such tetrahedron.
     pub fn is_degenerate(&self, tetrahedron: usize) -> bool {
         let edges = edges(self.corners(tetrahedron));
         let longest = edges.x_axis.length().max(edges.y_axis.length()).max(edges.z_axis.length());

@@ -152,7 +152,7 @@ impl TriangleMesh {
     /// The corners of a triangle.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|index| self.positions[index as usize])
     }
@@ -172,7 +172,7 @@ impl TriangleMesh {
     /// Area of a triangle, in square tissue lengths.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     pub fn triangle_area(&self, triangle: usize) -> f64 {
         0.5 * doubled_normal(self.corners(triangle)).length()
     }
@@ -180,7 +180,7 @@ impl TriangleMesh {
     /// Whether a triangle has no significant area: its corners coincide or lie on a line.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     pub fn is_degenerate(&self, triangle: usize) -> bool {
         is_degenerate(self.corners(triangle))
     }
@@ -202,7 +202,7 @@ impl TriangleMesh {
     /// Unit normal of a triangle, `Vec3::ZERO` if it is degenerate.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     pub fn triangle_normal(&self, triangle: usize) -> Vec3 {
         unit(doubled_normal(self.corners(triangle)))
     }

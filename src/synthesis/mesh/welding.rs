@@ -15,7 +15,7 @@ impl Welding {
     /// The welded vertex that a vertex of the mesh belongs to. Welded vertices are numbered in order of appearance.
     ///
     /// # Panics
-    /// When the mesh has no such vertex.
+    /// If the mesh has no such vertex.
     pub fn vertex(&self, vertex: u32) -> usize {
         self.vertices[vertex as usize] as usize
     }

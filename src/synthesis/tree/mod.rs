@@ -117,7 +117,7 @@ impl VesselTree {
     /// The parent of a node, `None` for a root.
     ///
     /// # Panics
-    /// When the node is not of this tree.
+    /// If the node is not in this tree.
     pub fn parent(&self, node: NodeId) -> Option<NodeId> {
         let parent = self.parents[node.index()];
         (parent != NO_PARENT).then_some(NodeId(parent))

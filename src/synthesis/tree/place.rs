@@ -26,7 +26,7 @@ impl VesselTree {
     /// Position of a place. A root has no segment: every place on it is the root itself.
     ///
     /// # Panics
-    /// When the node is not of this tree.
+    /// If the node is not in this tree.
     pub fn position_at(&self, place: Place) -> Vec3 {
         let end = self.positions()[place.node.index()];
         match self.parents()[place.node.index()] {

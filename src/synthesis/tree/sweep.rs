@@ -14,7 +14,7 @@ impl VesselTree {
     /// their index, each after all of its own children.
     ///
     /// # Panics
-    /// When `values` does not have one entry per node.
+    /// If `values` does not have one entry per node.
     pub fn fold_to_roots<T>(&self, values: &mut [T], mut merge: impl FnMut(&mut T, &T)) {
         assert_eq!(values.len(), self.len(), "one value per node");
         for (node, &parent) in self.parents().iter().enumerate().rev() {
@@ -31,7 +31,7 @@ impl VesselTree {
     /// node, each after its parent, and gets the parent's value and its own.
     ///
     /// # Panics
-    /// When `values` does not have one entry per node.
+    /// If `values` does not have one entry per node.
     pub fn fold_to_tips<T>(&self, values: &mut [T], mut step: impl FnMut(usize, &T, &mut T)) {
         assert_eq!(values.len(), self.len(), "one value per node");
         for (node, parent) in self.segments() {
@@ -93,7 +93,7 @@ impl VesselTree {
     /// Length of the segment that ends in a node, in tissue lengths; 0 for a root.
     ///
     /// # Panics
-    /// When the node is not of this tree.
+    /// If the node is not in this tree.
     pub fn segment_length(&self, node: usize) -> f64 {
         f64::from(self.segment_vector(node).length())
     }
@@ -170,7 +170,7 @@ impl Children {
     /// Children of a node in rising order; empty for a tip.
     ///
     /// # Panics
-    /// When the node is not of the tree.
+    /// If the node is not in the tree.
     pub fn of(&self, node: usize) -> &[u32] {
         &self.nodes[self.starts[node] as usize..self.starts[node + 1] as usize]
     }
@@ -254,7 +254,7 @@ impl Branches {
     /// Nodes of a branch along the vessel: its start (a root or split), then one for each of its segments.
     ///
     /// # Panics
-    /// When there are not that many branches.
+    /// If there are not that many branches.
     pub fn nodes(&self, branch: usize) -> &[u32] {
         &self.nodes[self.starts[branch] as usize..self.starts[branch + 1] as usize]
     }
@@ -267,7 +267,7 @@ impl Branches {
     /// The parent branch of a branch; `None` for one that begins at a root.
     ///
     /// # Panics
-    /// When there are not that many branches.
+    /// If there are not that many branches.
     pub fn parent(&self, branch: usize) -> Option<usize> {
         let parent = self.parents[branch];
         (parent != Self::NONE).then_some(parent as usize)
@@ -282,7 +282,7 @@ impl Branches {
     /// [`VesselTree::strahler_orders`] of the same tree.
     ///
     /// # Panics
-    /// When the orders are of another tree with fewer nodes.
+    /// If the orders are those of a tree with fewer nodes.
     pub fn strahler_orders(&self, node_orders: &[u32]) -> Vec<u32> {
         self.iter().map(|nodes| node_orders[nodes[1] as usize]).collect()
     }
