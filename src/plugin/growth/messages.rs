@@ -38,7 +38,7 @@ impl GrowthCommand {
     }
 }
 
-/// What a growth can be told to do.
+/// Actions of a growth command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Clone, PartialEq)]
 pub enum GrowthAction {

@@ -56,7 +56,7 @@ pub struct GrowthState {
     pub(super) unsettled: bool,
     /// Nodes whose radius changed since the vessels were last published.
     pub(super) changed: ByKind<Vec<u32>>,
-    /// Kinds whose vessels are to be published anew, from the first node on.
+    /// Kinds whose vessels must be published again, from the first node on.
     pub(super) rebuild: ByKind<bool>,
     pub(super) costs: Costs,
 }

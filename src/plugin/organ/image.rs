@@ -28,7 +28,7 @@ pub enum OrganImageError {
     /// The file is missing or broken.
     #[error("the image asset was not loaded ({reason}); check its path")]
     NotLoaded {
-        /// What the asset server says.
+        /// The asset server's error.
         reason: String,
     },
     /// Bevy has moved the data to the graphics card.
@@ -42,7 +42,7 @@ pub enum OrganImageError {
         "the image's pixels cannot be read ({reason}); use an uncompressed format such as R8Unorm or Rgba8UnormSrgb"
     )]
     Unreadable {
-        /// What Bevy says.
+        /// Bevy's error.
         reason: String,
     },
 }

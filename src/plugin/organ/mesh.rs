@@ -14,7 +14,7 @@ pub enum OrganMeshError {
     /// The file is missing or broken, or has no mesh with that label.
     #[error("the mesh asset was not loaded ({reason}); check its path and label")]
     NotLoaded {
-        /// What the asset server says.
+        /// The asset server's error.
         reason: String,
     },
     /// Points and lines have no surface.

@@ -113,7 +113,7 @@ fn changed_preset(event: &AssetEvent<PresetAsset>) -> Option<AssetId<PresetAsset
 }
 
 impl PresetOrganItem<'_, '_> {
-    /// Gives the organ what the preset says, if that differs from what it has.
+    /// Gives the organ the preset's vasculature, if that differs from its own.
     fn take_over(&mut self, preset: &PresetAsset, commands: &mut Commands) {
         let seed = self.vasculature.as_ref().map_or(self.preset.seed, |vasculature| vasculature.seed);
         let wish = Vasculature::from_preset(preset.0.clone()).with_seed(seed);

@@ -58,7 +58,7 @@ pub struct CuttableVessels {
 }
 
 impl CuttableVessels {
-    /// Severs every vessel that a blade crosses; a ball or capsule also takes out what lies within it.
+    /// Severs every vessel that a blade crosses; a ball or capsule also removes what lies within it.
     pub fn cut(&mut self, blade: Blade) {
         self.request(VesselCommand::new(VesselAction::Cut(blade)));
     }

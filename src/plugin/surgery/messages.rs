@@ -82,7 +82,7 @@ impl StrokeId {
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Clone, PartialEq)]
 pub enum VesselAction {
-    /// Severs every vessel that the blade crosses; a ball or capsule also takes out what lies within it.
+    /// Severs every vessel that the blade crosses; a ball or capsule also removes what lies within it.
     Cut(Blade),
     /// Seals by heat all vessels up to a calibre within a ball or capsule, for good.
     Cauterise {
@@ -183,7 +183,7 @@ pub struct VesselOperation {
 #[derive(Message, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Message, Clone, PartialEq)]
 pub struct VesselOperationFailed {
-    /// What was asked for.
+    /// The command.
     pub command: VesselCommand,
     /// Why it could not be done.
     pub error: OperationError,

@@ -20,7 +20,7 @@ pub enum WriteError {
     Create {
         /// The path given.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// The content could not be written completely: the disk is full, or its source failed.
@@ -28,7 +28,7 @@ pub enum WriteError {
     Write {
         /// The path given.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// The finished file cannot be renamed: a folder has that name, or another program holds the file.
@@ -36,7 +36,7 @@ pub enum WriteError {
     Replace {
         /// The path given.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
 }

@@ -77,7 +77,7 @@ pub enum RootError {
         /// The number of places found.
         found: u32,
     },
-    /// A distance for roots to reach that is below [`Roots::LEAST_REACH`](super::Roots::LEAST_REACH), or not a number.
+    /// A reach of roots that is below [`Roots::LEAST_REACH`](super::Roots::LEAST_REACH), or NaN.
     #[error("{} roots are to reach {reach} equivalent diameters; it must be finite and at least {least}", kind.name())]
     Reach {
         /// The kind in question.
@@ -87,7 +87,7 @@ pub enum RootError {
         /// The least value.
         least: f32,
     },
-    /// Arteries and veins each put their roots beside the other.
+    /// Arteries and veins are each placed beside the other.
     #[error("arterial and venous roots are each placed beside the other's; place one of them otherwise")]
     BesideEachOther,
     /// A given tree with such a coordinate.

@@ -131,8 +131,8 @@ fn compact_tissues_have_one_root_and_long_ones_several_within_reach() -> Result<
         assert!((tissue.extent().equivalent_diameter() - size).abs() < 1e-3);
         for seed in 0..20 {
             let ByKind { artery: arteries, vein: veins, .. } = Roots::default().resolve(&*tissue, &SPACING, seed)?;
-            // At the least one for two ways of 1.8. At most as many as fit with 0.6 of a way between them, which
-            // zigzags between samples and is a fifth longer.
+            // At least one for two ways of 1.8. At most as many as fit with 0.6 of a way between them, which zigzags
+            // between samples and is a fifth longer.
             let most = 1 + (8.0 * 1.2 / (0.6 * way)) as usize;
             assert!((3..=most).contains(&arteries.len()), "seed {seed}: {} roots of {most}", arteries.len());
             assert_eq!(arteries.len(), veins.len());

@@ -16,9 +16,9 @@ use crate::synthesis::{
 impl Wounds {
     /// Severs every vessel that the blade crosses; a ball or capsule also removes what lies within it.
     ///
-    /// The blade is in the tree's space: see [`Blade::to_local`]. What counts as crossed is said at
-    /// [`severed`]. Gaps are no vessel: what crosses one severs nothing there. How far the ends draw back, and what holds
-    /// them, is said at [`Retraction`](super::Retraction).
+    /// The blade is in the tree's space: see [`Blade::to_local`]. [`severed`] defines what counts as crossed. A blade
+    /// that crosses a gap severs nothing there. [`Retraction`](super::Retraction) defines how far the ends retract, and
+    /// what holds them.
     pub fn cut(&mut self, blade: &Blade, tree: &VesselTree, mut search: impl SegmentSearch) -> WoundReport {
         let mut hits = std::mem::take(&mut self.hits);
         severed(blade, tree, |region, visit| search.candidates(region, visit), &mut hits);

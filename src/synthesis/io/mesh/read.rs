@@ -14,7 +14,7 @@ pub enum MeshReadError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         source: io::Error,
     },
     /// An unsupported extension.

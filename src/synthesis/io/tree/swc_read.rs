@@ -24,7 +24,7 @@ pub enum ReadError {
     Open {
         /// The path given.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// Reading failed.
@@ -32,7 +32,7 @@ pub enum ReadError {
     Read {
         /// The line, from 1.
         line: usize,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// A line with fewer than seven columns.

@@ -92,8 +92,8 @@ impl PointGrid {
         found
     }
 
-    /// Whether a point lies within a squared radius of a centre, in the cells from `low` to `high`, no more than two along each
-    /// axis.
+    /// Whether a point lies within a squared radius of a centre, in the cells from `low` to `high`, at most two along
+    /// each axis.
     ///
     /// All of them are checked, whatever is found: a search that may end at any time causes so many branch
     /// mispredictions that it takes longer. Each axis's part of the indices of [`locate`](Self::locate) is computed

@@ -49,7 +49,7 @@ impl ImageChannel {
 
 /// How an image is read as tissue: all pixels or voxels of at least a threshold belong to it.
 ///
-/// A flat picture stands upright, in the plane z = 0 unless the origin says otherwise, and is a surface; a volume is a solid.
+/// A flat picture stands upright, in the plane z = 0 for the default origin, and is a surface; a volume is a solid.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
