@@ -1,6 +1,6 @@
 //! The budget decides how many steps a frame does, and nothing else.
 
-use crate::*;
+use super::*;
 use bevy_vessels::plugin::{EntityCommandsExt, GrowthFrame, GrowthStarted};
 
 fn grown_with(budget: GrowthBudget) -> [VesselTree; 2] {

@@ -1,6 +1,6 @@
 //! Vessel entities belong to their organ: they come, move, hide and go with it.
 
-use crate::*;
+use super::*;
 use bevy_vessels::plugin::{VesselAppearance, VesselsOf};
 
 fn vessel_count(app: &mut App) -> usize {

@@ -1,7 +1,7 @@
 //! What a point or a ray finds, against a search of all segments one by one, whatever has been indexed.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy::{
     ecs::system::SystemId,
     math::{DAffine3, DVec3},

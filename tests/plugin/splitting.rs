@@ -1,8 +1,8 @@
 //! A generator that is not of the crate, splits segments and grows more than two kinds: what it replaces is followed or
 //! cleared by everything that holds on to a tree.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy::ecs::system::RunSystemOnce;
 use bevy_vessels::{
     plugin::{

@@ -8,14 +8,14 @@ use crate::plugin::{
     announcer::Announcer,
     circulation::{
         bleeding::BleedingMessages,
-        messages::{BleedingStopped, CirculationFailed},
+        messages::{BleedingStopped, CirculationError, CirculationFailed},
         organ_flow::{FlowingEnd, OrganFlow, Trees},
         patient::Patient,
         perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply},
         supply::Gauge,
     },
     growth::{progress::GrowthProgress, state::GrowthState},
-    job::{Job, Jobs},
+    job::{Job, JobPanic, Jobs},
     surgery::open_ends::{OpenEnd, OpenEndEntities},
     vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
 };
@@ -71,7 +71,7 @@ pub struct CirculationState {
     #[serde(skip)]
     pub(crate) gauge: Gauge,
     #[serde(skip)]
-    error: Option<FlowError>,
+    error: Option<CirculationError>,
 }
 
 /// Which vessels a flow is of.
@@ -108,7 +108,7 @@ impl CirculationState {
     }
 
     /// Why no blood flows, if something is wrong.
-    pub fn error(&self) -> Option<&FlowError> {
+    pub fn error(&self) -> Option<&CirculationError> {
         self.error.as_ref()
     }
 
@@ -224,7 +224,7 @@ impl PerfusedOrganItem<'_, '_> {
             self.forget(vessels, messages);
         }
         if let Err(error) = self.follow_bleeding_settings() {
-            self.fail(error, &mut messages.failed);
+            self.fail(error.into(), &mut messages.failed);
             return;
         }
         let nodes: usize = made_for.nodes.values().sum();
@@ -285,15 +285,21 @@ impl PerfusedOrganItem<'_, '_> {
         Ok(())
     }
 
-    fn accept(&mut self, made: Result<OrganFlow, FlowError>, failed: &mut Announcer<CirculationFailed>) {
+    fn accept(
+        &mut self,
+        made: Result<Result<OrganFlow, FlowError>, JobPanic>,
+        failed: &mut Announcer<CirculationFailed>,
+    ) {
         let is_grown = self.state.made_for.is_some_and(|made_for| made_for.is_grown);
-        if let Err(error) = made.and_then(|flow| self.state.take(flow, is_grown)) {
-            self.fail(error, failed);
+        match made.map(|made| made.and_then(|flow| self.state.take(flow, is_grown))) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => self.fail(error.into(), failed),
+            Err(panic) => self.fail(panic.into(), failed),
         }
     }
 
     /// The blood stands still until something changes.
-    pub(crate) fn fail(&mut self, error: FlowError, failed: &mut Announcer<CirculationFailed>) {
+    pub(crate) fn fail(&mut self, error: CirculationError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
         warn!("{organ}: its blood stands still: {error}");
         self.state.job = None;

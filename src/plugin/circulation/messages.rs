@@ -3,6 +3,7 @@
 //! Each is a message, and an event on the organ, for observers. An open end is named by the fields: the organ is there to
 //! observe before it is cut, and after the end is closed.
 
+use crate::plugin::job::JobPanic;
 use crate::synthesis::haemodynamics::{EndSide, FlowError};
 use crate::synthesis::wound::EndId;
 use bevy::{
@@ -59,5 +60,17 @@ pub struct CirculationFailed {
     #[event_target]
     pub organ: Entity,
     /// What was wrong, with the value and the remedy.
-    pub error: FlowError,
+    pub error: CirculationError,
+}
+
+/// Why the blood of an organ does not flow.
+#[derive(Clone, Debug, PartialEq, thiserror::Error, Reflect)]
+#[reflect(opaque, Clone, Debug, PartialEq)]
+pub enum CirculationError {
+    /// Its settings or its vessels leave no way to flow.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+    /// The work on its network panicked.
+    #[error(transparent)]
+    Panicked(#[from] JobPanic),
 }

@@ -21,7 +21,7 @@ pub(crate) mod perfusion;
 mod supply;
 
 pub use flow::CirculationState;
-pub use messages::{BleedingStarted, BleedingStopped, CirculationFailed};
+pub use messages::{BleedingStarted, BleedingStopped, CirculationError, CirculationFailed};
 pub use patient::Patient;
 pub use perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply};
 

@@ -7,11 +7,12 @@ use crate::plugin::vessels::tree::Vessels;
 use crate::plugin::{
     circulation::{
         flow::CirculationState,
+        messages::CirculationError,
         organ_flow::{Condition, Measured, OrganFlow, SupplyGauge},
         patient::{Patient, patient_of},
         perfusion::{OrganSupply, Perfusion, SegmentSupply},
     },
-    job::{Job, Jobs},
+    job::{Job, JobPanic, Jobs},
     organ::{mesh::vertex_positions, rest::RestMesh},
     vessels::relations::OrganVessels,
 };
@@ -79,8 +80,8 @@ impl Gauge {
     }
 
     /// What has been measured, and keeps what it was measured with.
-    fn accept(&mut self, outcome: Outcome) -> Result<Measured, FlowError> {
-        let (gauge, measured) = outcome?;
+    fn accept(&mut self, outcome: Result<Outcome, JobPanic>) -> Result<Measured, CirculationError> {
+        let (gauge, measured) = outcome??;
         self.gauge = Some(gauge);
         Ok(measured)
     }
@@ -190,7 +191,7 @@ impl SuppliedItem<'_, '_> {
         }
     }
 
-    fn accept(&mut self, outcome: Outcome, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
+    fn accept(&mut self, outcome: Result<Outcome, JobPanic>, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
         let gauge = &mut self.state.bypass_change_detection().gauge;
         let mut measured = match gauge.accept(outcome) {
             Ok(measured) => measured,

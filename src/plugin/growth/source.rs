@@ -212,7 +212,7 @@ impl OrganItem<'_, '_> {
         };
         self.enter(GrowthPhase::PreparingTissue);
         let (source, paint) = (self.wish.tissue.clone(), self.state.paint());
-        self.run(copy.work(&source), jobs, |pace| copy.prepare(source, paint, pace))
+        self.run(copy.work(&source).saturating_add(paint.work()), jobs, |pace| copy.prepare(source, paint, pace))
     }
 
     /// Grows on the tissue at hand, which is painted first where it isn't yet as it is to be. After a stroke, vessels grow
@@ -229,7 +229,7 @@ impl OrganItem<'_, '_> {
         }
         let phase = if self.state.is_beside() { GrowthPhase::Regrowing } else { GrowthPhase::PreparingTissue };
         self.enter(phase);
-        self.run(tissue.work(&paint), jobs, |_| tissue.repainted(paint))
+        self.run(tissue.work(&paint), jobs, |pace| tissue.repainted(paint, pace))
     }
 
     /// Has a tissue made in a job, and is not waited for; without jobs, starts the growth on it.

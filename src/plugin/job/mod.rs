@@ -2,7 +2,8 @@
 //! thread, and a slice in each frame where there is none.
 //!
 //! In: [paced](crate::synthesis::pace) work, and how many items it goes through. Out: its result, in the same frame or a
-//! later one. Where the work is done never changes what comes out. Who lets go of a [`Job`] stops it.
+//! later one. Where the work is done never changes what comes out. Who lets go of a [`Job`] stops it. Work that panics
+//! ends in a [`JobPanic`], so that nobody waits for it.
 
 use crate::plugin::order::VesselSystems;
 use crate::synthesis::pace::{Pace, at_once};
@@ -16,21 +17,24 @@ use bevy::{
         schedule::{IntoScheduleConfigs, ScheduleLabel},
         system::SystemParam,
     },
-    platform::time::Instant,
     reflect::{Reflect, std_traits::ReflectDefault},
-    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready},
+    tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready, futures_lite::FutureExt},
 };
+use slices::{JobSlices, Place};
 use std::{
-    collections::VecDeque,
+    any::Any,
     fmt,
-    pin::Pin,
+    panic::AssertUnwindSafe,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, AtomicU64, Ordering},
+        Arc,
+        atomic::{AtomicBool, Ordering},
     },
-    task::{Context, Waker},
     time::Duration,
 };
+
+mod slices;
+#[cfg(test)]
+mod tests;
 
 /// Where work is done that takes longer than a frame: tissues, indices, networks and bindings of large organs.
 ///
@@ -54,7 +58,8 @@ pub struct JobSettings {
     /// Higher values end them sooner and take more of each frame. Whatever it is, one job goes on a little in each frame, so
     /// that all come to their end.
     ///
-    /// Units: time on this machine. Limits: none. Default: [`Self::DEFAULT_SLICE_TIME`].
+    /// Units: time on this machine. Limits: none; 0 does one stretch of one job a frame. Default:
+    /// [`Self::DEFAULT_SLICE_TIME`].
     pub slice_time: Duration,
 }
 
@@ -72,6 +77,8 @@ impl Default for JobSettings {
 }
 
 /// Who does work that is too large to be done at once.
+///
+/// What comes out is the same to the last bit; only the frame in which it comes differs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum JobMode {
@@ -92,6 +99,32 @@ impl JobMode {
             Self::Slices => true,
         }
     }
+}
+
+/// The work that an organ was waiting for panicked. That organ fails; the app and all other organs go on.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the work on it panicked ({message}), which is a fault of bevy_vessels; please report it with mesh and settings"
+)]
+pub struct JobPanic {
+    /// What the panic said.
+    pub message: String,
+}
+
+impl JobPanic {
+    fn new(payload: &(dyn Any + Send)) -> Self {
+        let text = payload.downcast_ref::<&str>().copied();
+        let message = text.or(payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message").to_owned();
+        Self { message }
+    }
+}
+
+/// What comes out of a job.
+type Outcome<T> = Result<T, JobPanic>;
+
+/// Does work to its end, or to its panic: what it has made by then is dropped, so that nothing half done is left.
+async fn guarded<T>(work: impl Future<Output = T>) -> Outcome<T> {
+    AssertUnwindSafe(work).catch_unwind().await.map_err(|payload| JobPanic::new(&*payload))
 }
 
 /// Begins jobs.
@@ -119,9 +152,9 @@ impl Jobs<'_> {
         W: Future<Output = T> + Send + 'static,
     {
         if self.is_small(items) {
-            Job::done(at_once(work(Pace::default())))
+            Job::at_once(work)
         } else if self.settings.mode.is_sliced() {
-            self.slices.start(work)
+            Job::in_slices(&self.slices, work)
         } else {
             Job::in_task_pool(work)
         }
@@ -130,20 +163,23 @@ impl Jobs<'_> {
 
 /// Work that was begun, and its result once it is there. To let go of it stops it.
 pub(crate) struct Job<T> {
-    work: Work<T>,
+    work: Work<Outcome<T>>,
     pace: Pace,
+    /// Tells the work that nobody waits for it any more.
     is_dropped: Arc<AtomicBool>,
 }
 
 enum Work<T> {
     Done(Option<T>),
     Task(Task<T>),
-    Slices(Arc<Mutex<Option<T>>>),
+    Slices(Place<T>),
 }
 
 impl<T: Send + 'static> Job<T> {
-    fn done(result: T) -> Self {
-        Self { work: Work::Done(Some(result)), pace: Pace::default(), is_dropped: Arc::default() }
+    fn at_once<W: Future<Output = T>>(work: impl FnOnce(Pace) -> W) -> Self {
+        let pace = Pace::default();
+        let result = at_once(guarded(work(pace.clone())));
+        Self { work: Work::Done(Some(result)), pace, is_dropped: Arc::default() }
     }
 
     fn in_task_pool<W: Future<Output = T> + Send + 'static>(work: impl FnOnce(Pace) -> W) -> Self {
@@ -153,8 +189,14 @@ impl<T: Send + 'static> Job<T> {
             let is_dropped = Arc::clone(&is_dropped);
             move || is_dropped.load(Ordering::Relaxed)
         });
-        let task = AsyncComputeTaskPool::get_or_init(TaskPool::new).spawn(work(pace.clone()));
+        let task = AsyncComputeTaskPool::get_or_init(TaskPool::new).spawn(guarded(work(pace.clone())));
         Self { work: Work::Task(task), pace, is_dropped }
+    }
+
+    fn in_slices<W: Future<Output = T> + Send + 'static>(slices: &JobSlices, work: impl FnOnce(Pace) -> W) -> Self {
+        let (pace, is_dropped) = (slices.pace(), Arc::<AtomicBool>::default());
+        let place = slices.add(guarded(work(pace.clone())), Arc::clone(&is_dropped));
+        Self { work: Work::Slices(place), pace, is_dropped }
     }
 
     /// Whether the result is there.
@@ -162,7 +204,7 @@ impl<T: Send + 'static> Job<T> {
         match &self.work {
             Work::Done(_) => true,
             Work::Task(task) => task.is_finished(),
-            Work::Slices(result) => lock(result).is_some(),
+            Work::Slices(place) => place.is_filled(),
         }
     }
 
@@ -172,11 +214,11 @@ impl<T: Send + 'static> Job<T> {
     }
 
     /// Takes the result out of a job that is done, and lets go of the job.
-    pub(crate) fn poll(job: &mut Option<Self>) -> Option<T> {
+    pub(crate) fn poll(job: &mut Option<Self>) -> Option<Outcome<T>> {
         let result = match &mut job.as_mut()?.work {
             Work::Done(result) => result.take(),
             Work::Task(task) => check_ready(task),
-            Work::Slices(result) => lock(result).take(),
+            Work::Slices(place) => place.take(),
         };
         if result.is_some() {
             *job = None;
@@ -197,97 +239,8 @@ impl<T> fmt::Debug for Job<T> {
     }
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Jobs that are done in slices, on this thread.
-#[derive(Resource, Default)]
-pub(crate) struct JobSlices {
-    /// In the order of their turns. Systems that begin jobs need no exclusive access.
-    queue: Mutex<VecDeque<Sliced>>,
-    clock: Arc<SliceClock>,
-}
-
-struct Sliced {
-    /// Puts its result where the job finds it.
-    work: Pin<Box<dyn Future<Output = ()> + Send>>,
-    is_dropped: Arc<AtomicBool>,
-}
-
-/// When the slices of a frame end.
-struct SliceClock {
-    zero: Instant,
-    /// Nanoseconds since then.
-    end: AtomicU64,
-}
-
-impl Default for SliceClock {
-    fn default() -> Self {
-        Self { zero: Instant::now(), end: AtomicU64::new(0) }
-    }
-}
-
-impl SliceClock {
-    fn now(&self) -> u64 {
-        self.zero.elapsed().as_nanos() as u64
-    }
-
-    fn begin(&self, time: Duration) {
-        let time = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-        self.end.store(self.now().saturating_add(time), Ordering::Relaxed);
-    }
-
-    fn is_over(&self) -> bool {
-        self.now() >= self.end.load(Ordering::Relaxed)
-    }
-}
-
-impl JobSlices {
-    fn start<T, W>(&self, work: impl FnOnce(Pace) -> W) -> Job<T>
-    where
-        T: Send + 'static,
-        W: Future<Output = T> + Send + 'static,
-    {
-        let clock = Arc::clone(&self.clock);
-        let pace = Pace::new(move || clock.is_over());
-        let (result, is_dropped) = (Arc::new(Mutex::new(None)), Arc::<AtomicBool>::default());
-        let (work, place) = (work(pace.clone()), Arc::clone(&result));
-        let work = Box::pin(async move {
-            let result = work.await;
-            *lock(&place) = Some(result);
-        });
-        lock(&self.queue).push_back(Sliced { work, is_dropped: Arc::clone(&is_dropped) });
-        Job { work: Work::Slices(result), pace, is_dropped }
-    }
-
-    /// Does a frame's slices: of one job until the time is over or it is done, then of the next. The next frame begins with
-    /// the next job.
-    fn advance(&self, time: Duration) {
-        let mut turns = std::mem::take(&mut *lock(&self.queue));
-        turns.retain(|job| !job.is_dropped.load(Ordering::Relaxed));
-        self.clock.begin(time);
-        while let Some(mut job) = turns.pop_front() {
-            if job.work.as_mut().poll(&mut Context::from_waker(Waker::noop())).is_pending() {
-                turns.push_back(job);
-            }
-            if self.clock.is_over() {
-                break;
-            }
-        }
-        let mut queue = lock(&self.queue);
-        turns.append(&mut queue);
-        *queue = turns;
-    }
-}
-
-/// Begin of a frame: jobs that are done in slices go on.
-pub(crate) fn advance_slices(settings: Res<JobSettings>, slices: Res<JobSlices>) {
-    slices.advance(settings.slice_time);
-}
-
 /// Registers what jobs need, with the systems of a schedule.
 pub(crate) fn register(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
     app.init_resource::<JobSettings>().init_resource::<JobSlices>().register_type::<JobSettings>();
-    app.add_systems(schedule, advance_slices.before(VesselSystems::Source));
+    app.add_systems(schedule, slices::advance_slices.before(VesselSystems::Source));
 }
