@@ -32,8 +32,8 @@ mod surgery;
 mod vessels;
 
 pub use circulation::{
-    BleedingStarted, BleedingStopped, BloodLoss, CirculationFailed, CirculationPlugin, CirculationState, OrganSupply,
-    Patient, Perfusion, SegmentSupply,
+    BleedingStarted, BleedingStopped, BloodLoss, CirculationError, CirculationFailed, CirculationPlugin,
+    CirculationState, OrganSupply, Patient, Perfusion, SegmentSupply,
 };
 pub use deformation::{DeformationPlugin, FollowsMesh, FollowsTetrahedra};
 pub use growth::{
@@ -41,7 +41,7 @@ pub use growth::{
     GrowthFrame, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthStarted, GrowthState, OrganGrowthError, OrganPaint,
     Vasculature, diagnostics,
 };
-pub use job::{JobMode, JobSettings};
+pub use job::{JobMode, JobPanic, JobSettings};
 pub use order::VesselSystems;
 pub use organ::{OrganImage, OrganImageError, OrganMeshError, RestMesh, triangle_mesh};
 pub use scene::{PresetAsset, PresetLoadError, PresetLoader, ScenePlugin, VesselPreset};

@@ -49,15 +49,24 @@ pub struct Pace {
     part: Part,
 }
 
+/// A part of the whole work, from one share of it to another.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     from: f32,
-    span: f32,
+    to: f32,
 }
 
 impl Default for Part {
     fn default() -> Self {
-        Self { from: 0.0, span: 1.0 }
+        Self { from: 0.0, to: 1.0 }
+    }
+}
+
+impl Part {
+    /// Which share of the whole work is done when this one of the part is. Exactly the part's end at its end, so that parts of
+    /// parts end there, too.
+    fn at(self, share: f32) -> f32 {
+        if share >= 1.0 { self.to } else { self.from + (self.to - self.from) * share.max(0.0) }
     }
 }
 
@@ -92,23 +101,25 @@ impl Pace {
     /// The pace of a part of this work, given by its shares at start and end.
     #[must_use]
     pub fn part(&self, shares: Range<f32>) -> Self {
-        let Part { from, span } = self.part;
-        let part = Part { from: from + span * shares.start, span: span * (shares.end - shares.start) };
+        let part = Part { from: self.part.at(shares.start), to: self.part.at(shares.end) };
         Self { watch: self.watch.clone(), part }
     }
 
     /// Rests: reports the share of this work that is done, from 0 to 1, and pauses if asked to.
     pub async fn rest(&self, done: f32) {
         let Some(watch) = &self.watch else { return };
-        let progress = (self.part.from + self.part.span * done).clamp(0.0, 1.0);
+        let progress = self.part.at(done).clamp(0.0, 1.0);
         watch.progress.fetch_max(progress.to_bits(), Ordering::Relaxed);
         if (watch.pauses)() {
             pause().await;
         }
     }
 
-    /// Calls `act` for ranges of `stretch` items, in order, and rests in between.
+    /// Calls `act` for ranges of `stretch` items, in order, and rests after each.
     pub(crate) async fn stretches(&self, items: usize, stretch: usize, mut act: impl FnMut(Range<usize>)) {
+        if items == 0 {
+            self.rest(1.0).await;
+        }
         for start in (0..items).step_by(stretch) {
             let end = items.min(start + stretch);
             act(start..end);
@@ -128,6 +139,27 @@ impl Pace {
         list
     }
 
+    /// The first of `items` cheap items for which `is_it` is true.
+    pub(crate) async fn find(&self, items: usize, is_it: impl Fn(usize) -> bool) -> Option<usize> {
+        let mut found = None;
+        for start in (0..items).step_by(STRETCH) {
+            found = (start..items.min(start + STRETCH)).find(|&item| is_it(item));
+            if found.is_some() {
+                break;
+            }
+            self.rest(start as f32 / items as f32).await;
+        }
+        self.rest(1.0).await;
+        found
+    }
+
+    /// The sum of `items` cheap items, from the first to the last.
+    pub(crate) async fn sum(&self, items: usize, item: impl Fn(usize) -> f64) -> f64 {
+        let mut sum = 0.0;
+        self.each(items, |number| sum += item(number)).await;
+        sum
+    }
+
     /// Sorts a list. The order of equal items doesn't matter: they are the same in every field.
     pub(crate) async fn sort<T: Ord + Copy>(&self, items: &mut Vec<T>) {
         if self.watch.is_none() {
@@ -139,19 +171,22 @@ impl Pace {
         self.part(0.0..0.5).stretches(len, run, |run| items[run].sort_unstable()).await;
         // Merges two runs at a time, into another list.
         let mut merged = Vec::with_capacity(len);
-        while run < len {
+        let (merging, passes) = (self.part(0.5..1.0), len.div_ceil(run).max(1).next_power_of_two().ilog2());
+        for pass in 0..passes {
+            let pace = merging.part(pass as f32 / passes as f32..(pass + 1) as f32 / passes as f32);
             merged.clear();
             for start in (0..len).step_by(2 * run) {
                 let (middle, end) = (len.min(start + run), len.min(start + 2 * run));
                 let mut taken = [0; 2];
                 while merged.len() < end {
                     merge([&items[start..middle], &items[middle..end]], &mut taken, &mut merged);
-                    self.rest(0.5 + 0.5 * run as f32 / len as f32).await;
+                    pace.rest(merged.len() as f32 / len as f32).await;
                 }
             }
             std::mem::swap(items, &mut merged);
             run *= 2;
         }
+        self.rest(1.0).await;
     }
 }
 
@@ -209,5 +244,156 @@ pub fn at_once<T>(work: impl Future<Output = T>) -> T {
         if let Poll::Ready(result) = work.as_mut().poll(&mut context) {
             return result;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::synthesis::pace::*;
+    use std::{cell::Cell, cmp::Ordering as Order, sync::atomic::AtomicUsize};
+
+    /// Numbers without an order to see.
+    fn mixed(count: usize) -> Vec<u32> {
+        (0..count as u32).map(|number| number.wrapping_mul(2_654_435_761) >> 20).collect()
+    }
+
+    /// Does work that pauses at every rest, and gives its result, how many rests there were, and the most items that it
+    /// counted between two of them.
+    fn measured<T, W: Future<Output = T>>(work: impl FnOnce(Pace, Arc<AtomicUsize>) -> W) -> (T, usize, usize) {
+        let [count, longest, rests] = [0; 3].map(|_| Arc::<AtomicUsize>::default());
+        let pace = Pace::new({
+            let (count, longest, rests) = (Arc::clone(&count), Arc::clone(&longest), Arc::clone(&rests));
+            move || {
+                longest.fetch_max(count.swap(0, Ordering::Relaxed), Ordering::Relaxed);
+                rests.fetch_add(1, Ordering::Relaxed);
+                true
+            }
+        });
+        let result = at_once(work(pace.clone(), count.clone()));
+        assert_eq!(pace.progress(), 1.0, "at the end");
+        let longest = longest.load(Ordering::Relaxed).max(count.load(Ordering::Relaxed));
+        (result, rests.load(Ordering::Relaxed), longest)
+    }
+
+    #[test]
+    fn there_are_never_more_items_than_a_stretch_between_two_rests() {
+        for items in [0, 1, STRETCH - 1, STRETCH, STRETCH + 1, 10 * STRETCH + 5] {
+            let least = items.div_ceil(STRETCH);
+            let tick = |count: &AtomicUsize| count.fetch_add(1, Ordering::Relaxed);
+            let (sum, rests, longest) = measured(async |pace, count| {
+                let mut sum = 0;
+                let add = |item| {
+                    tick(&count);
+                    sum += item;
+                };
+                pace.each(items, add).await;
+                sum
+            });
+            assert_eq!(sum, (0..items).sum::<usize>());
+            assert!(rests >= least && longest <= STRETCH, "{items} items: {rests} rests, {longest} between");
+            let item = |count: &AtomicUsize, item: usize| {
+                tick(count);
+                item
+            };
+            let (list, rests, longest) =
+                measured(async |pace, count| pace.collect(items, |number| item(&count, number)).await);
+            assert!(list.into_iter().eq(0..items) && rests >= least && longest <= STRETCH);
+            let (sum, rests, longest) =
+                measured(async |pace, count| pace.sum(items, |number| item(&count, number) as f64).await);
+            assert!(sum == (0..items).sum::<usize>() as f64 && rests >= least && longest <= STRETCH);
+            let (found, rests, longest) =
+                measured(async |pace, count| pace.find(items, |number| item(&count, number) + 1 == items).await);
+            assert!(found == items.checked_sub(1) && rests >= least && longest <= STRETCH);
+        }
+        let (found, ..) = measured(async |pace, _| pace.find(5000, |number| number > 7000).await);
+        assert_eq!(found, None);
+    }
+
+    #[test]
+    fn stretches_of_items_of_different_size_end_when_they_are_full() {
+        let mut stretch = Stretch::default();
+        let ends: Vec<bool> =
+            [STRETCH / 2, STRETCH / 2 - 1, 1, 0, 5 * STRETCH].map(|size| stretch.ends_after(size)).into();
+        assert_eq!(ends, [false, false, true, false, true]);
+    }
+
+    thread_local! {
+        static COMPARISONS: Cell<usize> = const { Cell::new(0) };
+    }
+
+    /// A number that counts how often it is compared.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    struct Counted(u32);
+
+    impl Ord for Counted {
+        fn cmp(&self, other: &Self) -> Order {
+            COMPARISONS.set(COMPARISONS.get() + 1);
+            self.0.cmp(&other.0)
+        }
+    }
+
+    impl PartialOrd for Counted {
+        fn partial_cmp(&self, other: &Self) -> Option<Order> {
+            Some(self.cmp(other))
+        }
+    }
+
+    #[test]
+    fn a_list_is_sorted_as_at_once_with_few_comparisons_between_two_rests() {
+        const RUN: usize = 4 * STRETCH;
+        for count in [0, 1, 2, RUN - 1, RUN, RUN + 1, 2 * RUN, 3 * RUN + 7, 9 * RUN - 1] {
+            let mut expected = mixed(count);
+            expected.sort_unstable();
+            let longest = Arc::<AtomicUsize>::default();
+            let pace = Pace::new({
+                let longest = Arc::clone(&longest);
+                move || {
+                    longest.fetch_max(COMPARISONS.replace(0), Ordering::Relaxed);
+                    true
+                }
+            });
+            let mut list: Vec<Counted> = mixed(count).into_iter().map(Counted).collect();
+            COMPARISONS.set(0);
+            at_once(pace.sort(&mut list));
+            assert!(list.iter().map(|counted| counted.0).eq(expected), "{count}");
+            // A run is sorted at once, by about n log₂ n comparisons.
+            let most = 2 * RUN * RUN.ilog2() as usize;
+            assert!(longest.load(Ordering::Relaxed) <= most, "{count}: {longest:?} comparisons");
+            assert_eq!(pace.progress(), 1.0, "{count}");
+        }
+    }
+
+    #[test]
+    fn parts_of_parts_end_exactly_where_the_whole_does() {
+        let pace = Pace::new(|| false);
+        for cut in [0.1, 0.3, 0.7, 1.0 / 3.0] {
+            let inner = pace.part(cut..1.0).part(1.0 - cut..1.0).part(cut..1.0);
+            assert_eq!(inner.part.to, 1.0, "cut at {cut}");
+            at_once(inner.rest(1.0));
+            assert_eq!(pace.progress(), 1.0);
+        }
+    }
+
+    #[test]
+    fn progress_never_falls_and_stays_within_its_part() {
+        let pace = Pace::new(|| false);
+        let part = pace.part(0.2..0.6);
+        for (done, expected) in [(0.5, 0.4), (0.25, 0.4), (-3.0, 0.4), (f32::NAN, 0.4), (7.0, 0.6)] {
+            at_once(part.rest(done));
+            assert!((pace.progress() - expected).abs() < 1e-6, "{done}: {}", pace.progress());
+        }
+        assert_eq!(Pace::default().progress(), 0.0, "nobody watches");
+    }
+
+    #[test]
+    fn a_pause_ends_when_the_work_is_polled_again() {
+        let pace = Pace::new(|| true);
+        let mut work = pin!(async {
+            pace.rest(0.5).await;
+            pace.rest(1.0).await;
+        });
+        let mut context = Context::from_waker(Waker::noop());
+        let polls: Vec<bool> = (0..3).map(|_| work.as_mut().poll(&mut context).is_ready()).collect();
+        assert_eq!(polls, [false, false, true]);
     }
 }

@@ -15,7 +15,7 @@ const FLOORS: &str = "
  products       haemodynamics  wound  instances  binding  io
  makers         growth  colonization  generator  preset
  input          mesh  organ  tree  segment_index  tissue  roots
- ground         units  random  pace  parallel  space
+ ground         units  pace  random  parallel  space
 ";
 
 /// Rooms of the plugin, in the order of the data, each with the rooms that it uses. All of them may use the ground.

@@ -1,6 +1,6 @@
 //! The budget decides only how many steps a frame does.
 
-use crate::*;
+use super::*;
 use bevy_vessels::plugin::{EntityCommandsExt, GrowthFrame, GrowthStarted};
 
 fn grown_with(budget: GrowthBudget) -> [VesselTree; 2] {

@@ -1,7 +1,7 @@
 //! Settings and meshes that change while vessels grow, or come late; and readers of the changes in vessels.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy_vessels::{
     plugin::{ChangeCursor, ChangeLog, Changes, Cuttable, GrowthStarted, VesselsOf},
     synthesis::tissue::{Extent, Tissue},

@@ -1,7 +1,7 @@
 //! Blood flows in organs of a Bevy world, and is lost.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy_vessels::{
     plugin::{
         BleedingStarted, BleedingStopped, BloodLoss, CirculationFailed, CirculationState, Cuttable, CuttableVessels,

@@ -1,7 +1,7 @@
 //! Vessels are cut, closed and healed on organs in a Bevy world.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy::math::Affine3A;
 use bevy_vessels::{
     plugin::{

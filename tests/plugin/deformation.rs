@@ -1,7 +1,7 @@
 //! Vessels follow a deformed organ, and are cut at their deformed positions.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy::math::Affine3A;
 use bevy_vessels::{
     plugin::{ChangeLog, Cuttable, FollowsMesh, FollowsTetrahedra},

@@ -1,6 +1,6 @@
 //! The plugin with all of Bevy's default plugins, without a graphics card, and organs from files.
 
-use crate::*;
+use super::*;
 use bevy::{
     asset::UnapprovedPathMode,
     log::LogPlugin,
@@ -24,6 +24,7 @@ fn desktop() -> App {
             .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() }),
         VesselPlugin::default(),
     ));
+    app.insert_resource(jobs());
     app.finish();
     app.cleanup();
     app

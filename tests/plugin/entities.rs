@@ -1,6 +1,6 @@
 //! Vessel entities belong to their organ: they are spawned, moved, hidden and despawned with it.
 
-use crate::*;
+use super::*;
 use bevy_vessels::plugin::{VesselAppearance, VesselsOf};
 
 fn vessel_count(app: &mut App) -> usize {

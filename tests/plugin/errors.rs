@@ -1,6 +1,6 @@
 //! An error of an organ is named, stops only that organ, and can be repaired.
 
-use crate::*;
+use super::*;
 use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, PrimitiveTopology},
@@ -9,7 +9,7 @@ use bevy_vessels::plugin::{GrowthFailed, OrganGrowthError, OrganMeshError};
 
 /// Runs until the organ fails, and returns the error.
 #[track_caller]
-fn failure(app: &mut App, organ: Entity) -> GrowthFailed {
+pub fn failure(app: &mut App, organ: Entity) -> GrowthFailed {
     let mut cursor = MessageCursor::default();
     drain::<GrowthFailed>(app.world(), &mut cursor);
     let mut failures = Vec::new();

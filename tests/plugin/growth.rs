@@ -1,6 +1,6 @@
 //! An organ grows, and follows commands.
 
-use crate::*;
+use super::*;
 use bevy_vessels::plugin::{EntityCommandsExt, GrowthControl, GrowthFinished, GrowthFrame, GrowthStarted, diagnostics};
 
 #[test]
@@ -34,6 +34,7 @@ fn an_organ_grows_over_frames_and_finishes() {
 fn mesh_assets_without_the_mesh_plugin_are_enough() {
     let mut app = App::new();
     app.add_plugins((TaskPoolPlugin::default(), AssetPlugin::default(), VesselPlugin::default()));
+    app.insert_resource(jobs());
     app.init_asset::<Mesh>();
     let organ = spawn(&mut app, quick());
     run_to_phase(&mut app, organ, GrowthPhase::Finished);

@@ -1,4 +1,8 @@
 //! The plugin in headless apps: no window, no renderer, no graphics card.
+//!
+//! These tests are built twice. In the target `plugin` small work is done at once and large work in the task pool, as on a
+//! desktop. In `plugin_in_slices` all work is done in slices, as in a browser. What comes out must be the same, so no test
+//! may count on a job being done within the frame in which it begins.
 
 mod budget;
 mod changes;
@@ -11,18 +15,20 @@ mod errors;
 mod growth;
 mod observers;
 mod operating_field;
+mod paint;
 mod picking;
 mod presets;
 mod registry;
 mod scene;
+mod sources;
 mod units;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};
 use bevy_vessels::{
     VesselPlugin,
     plugin::{
-        GrowthAction, GrowthBudget, GrowthCommand, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthState,
-        OrganVessels, Vasculature, Vessels,
+        GrowthAction, GrowthBudget, GrowthCommand, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthState, JobMode,
+        JobSettings, OrganVessels, Vasculature, Vessels,
     },
     synthesis::{
         colonization::{Colonization, ColonizationSettings},
@@ -41,17 +47,25 @@ const STEPS: u32 = 30;
 /// The kinds of vessels that they have.
 const KINDS: [VesselKind; 2] = Colonization::KINDS;
 
+/// Whether all jobs of these apps are done in slices.
+const IN_SLICES: bool = matches!(env!("CARGO_CRATE_NAME").as_bytes(), b"plugin_in_slices");
+
+/// The settings of jobs in this target.
+fn jobs() -> JobSettings {
+    if IN_SLICES { JobSettings { mode: JobMode::Slices, at_once: 0, ..default() } } else { default() }
+}
+
 /// The smallest app that can grow vessels.
 fn headless(budget: GrowthBudget) -> App {
+    headless_with_assets(budget, AssetPlugin::default())
+}
+
+/// The same, with assets from elsewhere.
+fn headless_with_assets(budget: GrowthBudget, assets: AssetPlugin) -> App {
     let mut app = App::new();
     let growth = GrowthPlugin::default().with_budget(budget);
-    app.add_plugins((
-        MinimalPlugins,
-        AssetPlugin::default(),
-        MeshPlugin,
-        TransformPlugin,
-        VesselPlugin { growth, ..default() },
-    ));
+    app.add_plugins((MinimalPlugins, assets, MeshPlugin, TransformPlugin, VesselPlugin { growth, ..default() }));
+    app.insert_resource(jobs());
     app.finish();
     app.cleanup();
     app

@@ -1,6 +1,6 @@
 //! Organs and instruments for the tests of cutting, bleeding and deformation.
 
-use crate::*;
+use super::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_vessels::{
     plugin::{Cuttable, CuttableVessels, OpenEnd, Perfusion, VesselWounds, VesselsOf},

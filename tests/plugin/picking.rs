@@ -1,7 +1,7 @@
 //! The results for points and rays, compared with a search of all segments one by one, at any state of the index.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy::{
     ecs::system::SystemId,
     math::{DAffine3, DVec3},

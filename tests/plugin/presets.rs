@@ -13,7 +13,7 @@ struct Folder(PathBuf);
 
 impl Folder {
     fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("bevy_vessels-{name}-{}", std::process::id()));
+        let folder = std::env::temp_dir().join(format!("{}-{name}-{}", env!("CARGO_CRATE_NAME"), std::process::id()));
         fs::create_dir_all(&folder).expect("a folder");
         Self(folder)
     }
@@ -37,12 +37,8 @@ fn text(steps: u32) -> String {
 }
 
 fn app(folder: &Folder) -> App {
-    let mut app = App::new();
     let assets = AssetPlugin { file_path: folder.0.to_string_lossy().into_owned(), ..default() };
-    app.add_plugins((MinimalPlugins, assets, MeshPlugin, TransformPlugin, VesselPlugin::default()));
-    app.finish();
-    app.cleanup();
-    app
+    headless_with_assets(GrowthBudget::default(), assets)
 }
 
 fn spawn_with_preset(app: &mut App, file: &'static str) -> Entity {

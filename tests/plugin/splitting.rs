@@ -1,8 +1,8 @@
 //! A generator outside the crate, which splits segments and grows more than two kinds: all data that refers to a
 //! replaced tree follows it or is cleared.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy::ecs::system::RunSystemOnce;
 use bevy_vessels::{
     plugin::{

@@ -1,7 +1,7 @@
 //! One organ in metres, in millimetres and as a toy: its vessels, and their blood loss.
 
-use crate::operating_field::*;
-use crate::*;
+use super::operating_field::*;
+use super::*;
 use bevy_vessels::{
     plugin::{BloodLoss, Perfusion},
     synthesis::units::Scale,

@@ -52,7 +52,7 @@ pub(crate) fn bleed(
         match organ.bleed(seconds, patient.bypass_change_detection(), &vessels, &mut open_ends, &mut messages) {
             Ok(false) => {}
             Ok(true) => patient.set_changed(),
-            Err(error) => organ.fail(error, &mut messages.failed),
+            Err(error) => organ.fail(error.into(), &mut messages.failed),
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::plugin::{
         state::{CirculationState, MadeFor},
     },
     growth::{progress::GrowthProgress, state::GrowthState},
-    job::{Job, Jobs},
+    job::{Job, JobPanic, Jobs},
     surgery::open_ends::{OpenEnd, OpenEndEntities},
     vessels::{
         relations::{OrganVessels, VesselsOf},
@@ -109,7 +109,7 @@ impl PerfusedOrganItem<'_, '_> {
             self.forget(vessels, messages);
         }
         if let Err(error) = self.follow_bleeding_settings() {
-            self.fail(error, &mut messages.failed);
+            self.fail(error.into(), &mut messages.failed);
             return;
         }
         let nodes: usize = made_for.nodes.values().sum();
@@ -170,10 +170,16 @@ impl PerfusedOrganItem<'_, '_> {
         Ok(())
     }
 
-    fn accept(&mut self, made: Result<OrganFlow, FlowError>, failed: &mut Announcer<CirculationFailed>) {
+    fn accept(
+        &mut self,
+        made: Result<Result<OrganFlow, FlowError>, JobPanic>,
+        failed: &mut Announcer<CirculationFailed>,
+    ) {
         let is_grown = self.state.made_for.is_some_and(|made_for| made_for.is_grown);
-        if let Err(error) = made.and_then(|flow| self.state.take(flow, is_grown)) {
-            self.fail(error, failed);
+        match made.map(|made| made.and_then(|flow| self.state.take(flow, is_grown))) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => self.fail(error.into(), failed),
+            Err(panic) => self.fail(panic.into(), failed),
         }
     }
 }

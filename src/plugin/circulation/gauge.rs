@@ -1,8 +1,11 @@
 //! Schedules the measurements of an organ's supply.
 
 use crate::plugin::{
-    circulation::organ_flow::{Measured, SupplyGauge},
-    job::Job,
+    circulation::{
+        messages::CirculationError,
+        organ_flow::{Measured, SupplyGauge},
+    },
+    job::{Job, JobPanic},
 };
 use crate::synthesis::haemodynamics::FlowError;
 
@@ -58,8 +61,8 @@ impl Gauge {
     }
 
     /// Returns the measurement, and keeps the gauge.
-    pub(super) fn accept(&mut self, outcome: Outcome) -> Result<Measured, FlowError> {
-        let (gauge, measured) = outcome?;
+    pub(super) fn accept(&mut self, outcome: Result<Outcome, JobPanic>) -> Result<Measured, CirculationError> {
+        let (gauge, measured) = outcome??;
         self.gauge = Some(gauge);
         Ok(measured)
     }

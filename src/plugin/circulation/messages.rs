@@ -3,7 +3,7 @@
 //! Each is a message, and an event on the organ, for observers. The event targets the organ, since that exists before
 //! the cut and after the end closes; the fields name the open end.
 
-use crate::plugin::announcer::Announcer;
+use crate::plugin::{announcer::Announcer, job::JobPanic};
 use crate::synthesis::haemodynamics::{EndSide, FlowError};
 use crate::synthesis::wound::EndId;
 use bevy::{
@@ -61,7 +61,19 @@ pub struct CirculationFailed {
     #[event_target]
     pub organ: Entity,
     /// What was wrong, with the value and the remedy.
-    pub error: FlowError,
+    pub error: CirculationError,
+}
+
+/// Why the blood of an organ does not flow.
+#[derive(Clone, Debug, PartialEq, thiserror::Error, Reflect)]
+#[reflect(opaque, Clone, Debug, PartialEq)]
+pub enum CirculationError {
+    /// Its settings or its vessels leave no way to flow.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
+    /// The work on its network panicked.
+    #[error(transparent)]
+    Panicked(#[from] JobPanic),
 }
 
 /// The messages about bleeding.

@@ -23,7 +23,7 @@ pub(crate) mod perfusion;
 mod state;
 mod supply;
 
-pub use messages::{BleedingStarted, BleedingStopped, CirculationFailed};
+pub use messages::{BleedingStarted, BleedingStopped, CirculationError, CirculationFailed};
 pub use patient::Patient;
 pub use perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply};
 pub use state::CirculationState;

@@ -3,7 +3,7 @@
 use crate::plugin::{
     announcer::Announcer,
     circulation::{
-        messages::CirculationFailed,
+        messages::{CirculationError, CirculationFailed},
         perfusion::{BloodLoss, Perfusion},
         state::CirculationState,
     },
@@ -11,7 +11,7 @@ use crate::plugin::{
     surgery::open_ends::OpenEndEntities,
     vessels::{relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
 };
-use crate::synthesis::{haemodynamics::FlowError, tree::ByKind};
+use crate::synthesis::tree::ByKind;
 use bevy::{
     ecs::{entity::Entity, query::QueryData, system::Query, world::Ref},
     log::warn,
@@ -46,7 +46,7 @@ impl PerfusedOrganItem<'_, '_> {
     }
 
     /// Stops the blood until something changes.
-    pub(crate) fn fail(&mut self, error: FlowError, failed: &mut Announcer<CirculationFailed>) {
+    pub(crate) fn fail(&mut self, error: CirculationError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
         warn!("{organ}: its blood does not flow: {error}");
         self.state.job = None;

@@ -3,6 +3,7 @@
 use crate::plugin::{
     circulation::{
         gauge::Gauge,
+        messages::CirculationError,
         organ_flow::{FlowingEnd, Hydraulics, OrganFlow},
     },
     job::Job,
@@ -46,7 +47,7 @@ pub struct CirculationState {
     #[serde(skip)]
     pub(crate) gauge: Gauge,
     #[serde(skip)]
-    pub(super) error: Option<FlowError>,
+    pub(super) error: Option<CirculationError>,
 }
 
 /// The vessels of a flow.
@@ -83,7 +84,7 @@ impl CirculationState {
     }
 
     /// Why no blood flows, if something is wrong.
-    pub fn error(&self) -> Option<&FlowError> {
+    pub fn error(&self) -> Option<&CirculationError> {
         self.error.as_ref()
     }
 

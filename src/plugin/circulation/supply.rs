@@ -12,7 +12,7 @@ use crate::plugin::{
         perfusion::{OrganSupply, Perfusion, SegmentSupply},
         state::CirculationState,
     },
-    job::{Job, Jobs},
+    job::{Job, JobPanic, Jobs},
     organ::{mesh::vertex_positions, rest::RestMesh},
     vessels::relations::OrganVessels,
 };
@@ -135,7 +135,7 @@ impl SuppliedItem<'_, '_> {
         }
     }
 
-    fn accept(&mut self, outcome: Outcome, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
+    fn accept(&mut self, outcome: Result<Outcome, JobPanic>, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
         let gauge = &mut self.state.bypass_change_detection().gauge;
         let mut measured = match gauge.accept(outcome) {
             Ok(measured) => measured,

@@ -24,6 +24,7 @@ use bevy::{
         query::QueryData,
         system::Query,
     },
+    log::warn,
     math::Vec3,
 };
 use std::sync::Arc;
@@ -49,8 +50,9 @@ impl RestOrgan {
     async fn bind(&self, tree: &VesselTree, pace: &Pace) -> Option<Binding> {
         match self {
             Self::Surface(mesh) => {
-                let mesh = TriangleMesh::new(mesh.positions.clone(), mesh.triangles.clone(), None).ok()?;
-                Some(Binding::to_surface_paced(tree, &mesh, pace).await)
+                let (positions, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
+                let mesh = TriangleMesh::new_paced(positions, triangles, None, &pace.part(0.0..0.1)).await.ok()?;
+                Some(Binding::to_surface_paced(tree, &mesh, &pace.part(0.1..1.0)).await)
             }
             Self::Solid(mesh) => Some(Binding::to_tetrahedra_paced(tree, mesh, pace).await),
         }
@@ -78,6 +80,7 @@ struct MadeFor {
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(crate) struct Bound {
+    entity: Entity,
     vessels: &'static mut Vessels,
     binding: &'static mut VesselBinding,
     changes: &'static mut ChangeLog,
@@ -135,7 +138,10 @@ impl BoundItem<'_, '_> {
             binding.job = Some(jobs.start(work, async move |pace: Pace| rest.bind(&tree, &pace).await));
         }
         let Some(bound) = Job::poll(&mut binding.job) else { return false };
-        binding.binding = bound;
+        binding.binding = bound.unwrap_or_else(|panic| {
+            warn!("{}: these vessels don't follow their organ: {panic}", self.entity);
+            None
+        });
         true
     }
 

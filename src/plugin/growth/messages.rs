@@ -1,6 +1,9 @@
 //! Commands to a growth, and the messages that it sends.
 
-use crate::plugin::organ::{image::OrganImageError, mesh::OrganMeshError};
+use crate::plugin::{
+    job::JobPanic,
+    organ::{image::OrganImageError, mesh::OrganMeshError},
+};
 use crate::synthesis::{generator::GeneratorError, tissue::TissueError};
 use bevy::{
     ecs::{
@@ -121,4 +124,7 @@ pub enum OrganGrowthError {
     /// Its settings or roots are not valid.
     #[error(transparent)]
     Generator(#[from] GeneratorError),
+    /// The work on its tissue panicked.
+    #[error(transparent)]
+    Panicked(#[from] JobPanic),
 }

@@ -214,7 +214,7 @@ impl OrganItem<'_, '_> {
         };
         self.enter(GrowthPhase::PreparingTissue);
         let (source, paint) = (self.wish.tissue.clone(), self.state.paint());
-        self.run(copy.work(&source), jobs, |pace| copy.prepare(source, paint, pace))
+        self.run(copy.work(&source).saturating_add(paint.work()), jobs, |pace| copy.prepare(source, paint, pace))
     }
 
     /// Grows on the current tissue, after painting it if its paint is outdated. After a stroke, vessels grow beside the
@@ -231,7 +231,7 @@ impl OrganItem<'_, '_> {
         }
         let phase = if self.state.is_beside() { GrowthPhase::Regrowing } else { GrowthPhase::PreparingTissue };
         self.enter(phase);
-        self.run(tissue.work(&paint), jobs, |_| tissue.repainted(paint))
+        self.run(tissue.work(&paint), jobs, |pace| tissue.repainted(paint, pace))
     }
 
     /// Makes a tissue in a job, without waiting for it. Without jobs, makes it now and starts the growth on it.

@@ -17,6 +17,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     growth::{Growth, GrowthWarning},
+    mesh::TriangleMesh,
     preset::Preset,
     tissue::{Tissue, TissuePaint},
     tree::ByKind,
@@ -75,6 +76,12 @@ impl GrowthState {
     /// The tissue that is supplied, with its paint. `None` until it is ready.
     pub fn tissue(&self) -> Option<&dyn Tissue> {
         self.tissue.as_ref().map(|painted| &*painted.tissue)
+    }
+
+    /// The organ's mesh as the tissue is made of it, with its texture coordinates. `None` for other tissues, and until it is
+    /// ready.
+    pub fn mesh(&self) -> Option<&TriangleMesh> {
+        self.tissue.as_ref().and_then(PaintedTissue::mesh)
     }
 
     /// Why the growth failed, if it did.
@@ -246,14 +253,15 @@ impl GrowthState {
         self.preparation.as_ref().map(Job::progress)
     }
 
-    /// The result of the preparation, once it is ready. `None` if the paint has changed meanwhile: the tissue is kept,
-    /// to be painted again.
+    /// The result of the preparation, once it is ready. `None` if something else has been asked for meanwhile: a tissue
+    /// is kept, to be painted again, and an error may no longer hold.
     pub(crate) fn poll_preparation(&mut self) -> Option<Painted> {
-        match Job::poll(&mut self.preparation)? {
+        match Job::poll(&mut self.preparation)?.unwrap_or_else(|panic| Err(panic.into())) {
             Ok(tissue) if *tissue.paint != *self.paint() => {
                 self.tissue.get_or_insert(tissue);
                 None
             }
+            Err(_) if self.need != Need::Nothing => None,
             result => Some(result),
         }
     }
@@ -339,7 +347,44 @@ impl GrowthState {
 
 #[cfg(test)]
 mod tests {
-    use crate::plugin::growth::state::*;
+    use crate::plugin::{
+        growth::state::*,
+        job::{self, Jobs},
+    };
+    use crate::synthesis::{pace::Pace, tissue::TissueError};
+    use bevy::{
+        app::{App, Update},
+        ecs::{schedule::ScheduleLabel, system::SystemState},
+    };
+
+    /// A growth that waits for a preparation, which is done.
+    fn prepared<W: Future<Output = Painted> + Send + 'static>(preparation: impl FnOnce(Pace) -> W) -> GrowthState {
+        let (mut app, mut state) = (App::new(), GrowthState::default());
+        job::register(&mut app, Update.intern());
+        let mut jobs = SystemState::<Jobs>::new(app.world_mut());
+        state.await_tissue(jobs.get(app.world()).expect("jobs are registered").start(0, preparation));
+        assert!(state.is_tissue_ready());
+        state
+    }
+
+    #[test]
+    fn a_preparation_that_panics_is_an_error_and_can_be_tried_again() {
+        let mut state = prepared(async |_| panic!("a vertex of {} edges", 1));
+        let Some(Err(error)) = state.poll_preparation() else { panic!("an error") };
+        assert!(matches!(&error, OrganGrowthError::Panicked(_)) && error.to_string().contains("a vertex of 1 edges"));
+        state.fail(error);
+        assert!(state.error().is_some() && !state.is_tissue_ready());
+        state.obey(GrowthAction::Restart, GrowthControl::Running);
+        assert_eq!(state.next_need(), Need::Tissue);
+    }
+
+    #[test]
+    fn what_was_wrong_does_not_count_once_something_else_is_asked_for() {
+        let mut state = prepared(async |_| Err(TissueError::NoMesh.into()));
+        state.obey(GrowthAction::Restart, GrowthControl::Running);
+        assert!(state.poll_preparation().is_none());
+        assert_eq!(state.next_need(), Need::Tissue);
+    }
 
     #[test]
     fn a_restart_without_tissue_prepares_it() {

@@ -8,6 +8,7 @@ use crate::plugin::{
     },
 };
 use crate::synthesis::{
+    mesh::TriangleMesh,
     pace::Pace,
     tissue::{PreparedTissue, SourceData, Tissue, TissueError, TissuePaint, TissueSource},
 };
@@ -33,9 +34,14 @@ pub(crate) struct PaintedTissue {
 pub(crate) type Painted = Result<PaintedTissue, OrganGrowthError>;
 
 impl PaintedTissue {
-    fn new(base: PreparedTissue, paint: Arc<TissuePaint>) -> Painted {
-        let tissue = base.painted(&paint)?;
+    async fn new(base: PreparedTissue, paint: Arc<TissuePaint>, pace: &Pace) -> Painted {
+        let tissue = base.painted_paced(&paint, pace).await?;
         Ok(Self { base, paint, tissue })
+    }
+
+    /// The mesh that it is made of, if it is.
+    pub(crate) fn mesh(&self) -> Option<&TriangleMesh> {
+        self.base.mesh()
     }
 
     /// Work of laying other paint over it, in items.
@@ -44,8 +50,8 @@ impl PaintedTissue {
     }
 
     /// The same tissue with other paint.
-    pub(crate) async fn repainted(self, paint: Arc<TissuePaint>) -> Painted {
-        Self::new(self.base, paint)
+    pub(crate) async fn repainted(self, paint: Arc<TissuePaint>, pace: Pace) -> Painted {
+        Self::new(self.base, paint, &pace).await
     }
 }
 
@@ -69,15 +75,20 @@ impl SourceCopy {
     /// The slow part of the preparation. It depends on the copy and the arguments alone.
     pub(crate) async fn prepare(self, source: TissueSource, paint: Arc<TissuePaint>, pace: Pace) -> Painted {
         let mut data = SourceData::default();
-        match (self, source.image()) {
-            (Self::Mesh(mesh), _) => data.mesh = Some(Arc::new(mesh.check()?)),
+        let read = match (self, source.image()) {
+            (Self::Mesh(mesh), _) => {
+                data.mesh = Some(Arc::new(mesh.check(&pace.part(0.0..0.05)).await?));
+                0.05
+            }
             (Self::Image(image), Some(settings)) => {
                 let image = tissue_image(&image, settings.channel, &pace.part(0.0..0.5)).await?;
                 data.image = Some(Arc::new(image));
+                0.5
             }
-            _ => {}
-        }
-        PaintedTissue::new(source.prepare_paced(&data, &pace).await?, paint)
+            _ => 0.0,
+        };
+        let prepared = source.prepare_paced(&data, &pace.part(read..0.9)).await?;
+        PaintedTissue::new(prepared, paint, &pace.part(0.9..1.0)).await
     }
 }
 

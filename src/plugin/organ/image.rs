@@ -1,14 +1,14 @@
 //! From a Bevy image to the values of a tissue.
 
 use crate::synthesis::{
-    pace::Pace,
+    pace::{Pace, Stretch},
     tissue::{ImageChannel, TissueImage},
 };
 use bevy::{
     asset::Handle,
     color::{Color, ColorToComponents},
     ecs::{component::Component, reflect::ReflectComponent},
-    image::{Image, TextureAccessError},
+    image::{Image, TextureAccessError, TextureFormatPixelInfo},
     math::UVec3,
     prelude::{Deref, DerefMut},
     reflect::{Reflect, std_traits::ReflectDefault},
@@ -37,6 +37,25 @@ pub enum OrganImageError {
          RenderAssetUsages::MAIN_WORLD | RenderAssetUsages::RENDER_WORLD"
     )]
     OnGpuOnly,
+    /// There is no pixel.
+    #[error("the image has {} × {} × {} pixels; it needs at least one", size.x, size.y, size.z)]
+    Empty {
+        /// Pixels along each axis.
+        size: UVec3,
+    },
+    /// There are fewer pixels than the image's size says.
+    #[error(
+        "the image has {bytes} bytes, but {} × {} × {} pixels of its format take {expected}; give it all of them",
+        size.x, size.y, size.z
+    )]
+    Incomplete {
+        /// Pixels along each axis.
+        size: UVec3,
+        /// Bytes found.
+        bytes: usize,
+        /// Bytes that the pixels take.
+        expected: usize,
+    },
     /// The pixels cannot be read.
     #[error(
         "the image's pixels cannot be read ({reason}); use an uncompressed format such as R8Unorm or Rgba8UnormSrgb"
@@ -55,16 +74,34 @@ pub(crate) async fn tissue_image(
     pace: &Pace,
 ) -> Result<TissueImage, OrganImageError> {
     let size = UVec3::new(image.width(), image.height(), image.texture_descriptor.size.depth_or_array_layers);
+    check_size(image, size)?;
     let rows = size.y as usize * size.z as usize;
-    let mut values = Vec::with_capacity(rows * size.x as usize);
+    let (mut values, mut stretch) = (Vec::with_capacity(rows * size.x as usize), Stretch::default());
     for row in 0..rows {
         let (y, z) = (row as u32 % size.y, row as u32 / size.y);
         for x in 0..size.x {
             values.push(channel.of(stored(color_at(image, UVec3::new(x, y, z))?)));
+            if stretch.ends_after(1) {
+                pace.rest(row as f32 / rows as f32).await;
+            }
         }
-        pace.rest((row + 1) as f32 / rows as f32).await;
     }
+    pace.rest(1.0).await;
     Ok(TissueImage { size, values })
+}
+
+/// Passes an image that has a pixel, and as many as it says.
+fn check_size(image: &Image, size: UVec3) -> Result<(), OrganImageError> {
+    let pixels = size.to_array().into_iter().fold(1, |pixels: usize, side| pixels.saturating_mul(side as usize));
+    if pixels == 0 {
+        return Err(OrganImageError::Empty { size });
+    }
+    let bytes = image.data.as_ref().ok_or(OrganImageError::OnGpuOnly)?.len();
+    let expected = pixels.saturating_mul(image.texture_descriptor.format.pixel_size().map_err(unreadable)?);
+    if bytes < expected {
+        return Err(OrganImageError::Incomplete { size, bytes, expected });
+    }
+    Ok(())
 }
 
 fn color_at(image: &Image, at: UVec3) -> Result<Color, OrganImageError> {
@@ -73,10 +110,14 @@ fn color_at(image: &Image, at: UVec3) -> Result<Color, OrganImageError> {
         Err(TextureAccessError::WrongDimension) => image.get_color_at(at.x, at.y),
         other => other,
     };
-    color.map_err(|error| match error {
+    color.map_err(unreadable)
+}
+
+fn unreadable(error: TextureAccessError) -> OrganImageError {
+    match error {
         TextureAccessError::Uninitialized => OrganImageError::OnGpuOnly,
         other => OrganImageError::Unreadable { reason: other.to_string() },
-    })
+    }
 }
 
 /// Red, green, blue and alpha as the image stores them.
@@ -114,6 +155,16 @@ mod tests {
         assert_eq!((alpha.size, alpha.values), (UVec3::new(2, 1, 1), vec![1.0, 0.0]));
         let green = read(&image, ImageChannel::Green).expect("readable");
         assert_eq!(green.values, [0.0, 0.4]);
+    }
+
+    #[test]
+    fn images_without_all_their_pixels_are_refused() {
+        let mut image = two_pixels();
+        image.texture_descriptor.size.height = 3;
+        let error = read(&image, ImageChannel::Grey).err();
+        assert!(matches!(error, Some(OrganImageError::Incomplete { bytes: 8, expected: 24, .. })), "{error:?}");
+        image.texture_descriptor.size.height = 0;
+        assert!(matches!(read(&image, ImageChannel::Grey), Err(OrganImageError::Empty { .. })));
     }
 
     #[test]

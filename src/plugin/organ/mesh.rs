@@ -2,7 +2,10 @@
 //!
 //! In: a [`Mesh`] of any index format, as a triangle list or strip. Out: a [`TriangleMesh`] in the mesh's local space.
 
-use crate::synthesis::mesh::{MeshError, TriangleMesh};
+use crate::synthesis::{
+    mesh::{MeshError, TriangleMesh},
+    pace::{Pace, at_once},
+};
 use bevy::{
     math::{Vec2, Vec3},
     mesh::{Indices, Mesh, MeshAccessError, PrimitiveTopology, VertexAttributeValues, VertexFormat},
@@ -53,8 +56,8 @@ pub(crate) struct MeshCopy {
 
 impl MeshCopy {
     /// Checks it.
-    pub(crate) fn check(self) -> Result<TriangleMesh, OrganMeshError> {
-        Ok(TriangleMesh::new(self.positions, self.triangles, self.uvs)?)
+    pub(crate) async fn check(self, pace: &Pace) -> Result<TriangleMesh, OrganMeshError> {
+        Ok(TriangleMesh::new_paced(self.positions, self.triangles, self.uvs, pace).await?)
     }
 }
 
@@ -67,7 +70,7 @@ impl MeshCopy {
 /// # Errors
 /// [`OrganMeshError`] if the mesh cannot be an organ.
 pub fn triangle_mesh(mesh: &Mesh) -> Result<TriangleMesh, OrganMeshError> {
-    copy_mesh(mesh)?.check()
+    at_once(copy_mesh(mesh)?.check(&Pace::default()))
 }
 
 /// The positions of a mesh's vertices, if they are in main memory and three floats each.

@@ -18,7 +18,10 @@ use crate::synthesis::{
     segment_index::{RayCast, Region, SegmentIndex, SegmentSearch},
     tree::{NO_PARENT, NodeId, VesselTree},
 };
-use bevy::ecs::{change_detection::DetectChangesMut, component::Component, system::Query};
+use bevy::{
+    ecs::{change_detection::DetectChangesMut, component::Component, system::Query},
+    log::warn,
+};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 /// An index over the segments of a vessel entity. Every vessel entity has one, which is empty and free until the first
@@ -43,6 +46,8 @@ struct IndexState {
     is_wanted: bool,
     /// A newer index that is being made.
     coming: Option<Job<ComingIndex>>,
+    /// Whether the work on one panicked. It isn't tried again for the same tree.
+    has_failed: bool,
     /// Largest number of nodes for which a query indexes the tree itself.
     at_once: usize,
     /// Nodes of the tree in the last frame, and the number of frames without a change of it.
@@ -72,6 +77,7 @@ impl Default for IndexState {
             tree: Lineage::default(),
             is_wanted: false,
             coming: None,
+            has_failed: false,
             at_once: JobSettings::DEFAULT_AT_ONCE,
             len: 0,
             idle_frames: 0,
@@ -157,15 +163,21 @@ impl IndexState {
     /// Takes over an index that has become ready, and starts indexing a large tree again when that pays.
     fn advance(&mut self, vessels: &Vessels, log: &ChangeLog, jobs: &Jobs) {
         self.at_once = jobs.at_once();
-        if let Some(come) = Job::poll(&mut self.coming) {
-            (self.index, self.cursor) = (come.index, come.cursor);
+        match Job::poll(&mut self.coming) {
+            Some(Ok(come)) => (self.index, self.cursor) = (come.index, come.cursor),
+            Some(Err(panic)) => {
+                warn!("large vessels are searched one by one, which is slow: {panic}");
+                self.has_failed = true;
+            }
+            None => {}
         }
         self.forget_others(vessels);
         let (len, indexed) = (vessels.tree().len(), self.index.len());
         self.idle_frames = if len == self.len { self.idle_frames.saturating_add(1) } else { 0 };
         self.len = len;
         let is_due = len - indexed > indexed / 2 || self.idle_frames > VesselIndex::IDLE_FRAMES;
-        if len > self.at_once && len > indexed && is_due && self.coming.is_none() {
+        let is_due = is_due && self.coming.is_none() && !self.has_failed;
+        if len > self.at_once && len > indexed && is_due {
             let (tree, cursor) = (vessels.tree().clone(), log.now());
             self.coming = Some(jobs.start(len, |pace| ComingIndex::of(tree, cursor, pace)));
         }

@@ -149,7 +149,7 @@ impl Vacancy {
         self.free_measure = self.listed_measure;
         self.even = listed.windows(2).all(|pair| pieces[pair[0] as usize].measure == pieces[pair[1] as usize].measure);
         if !self.even {
-            self.shares.rebuild(listed.iter().map(measure));
+            self.shares.rebuild(listed.len(), |slot| measure(&listed[slot]));
         }
     }
 

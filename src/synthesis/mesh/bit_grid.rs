@@ -18,14 +18,14 @@ impl BitGrid {
                 words[voxel / 64] |= 1 << (voxel % 64);
             }
         };
-        pace.each(candidates, add).await;
-        let mut before = 0;
-        let ranks = words.iter().map(|word| {
-            let rank = before;
-            before += word.count_ones();
-            rank
-        });
-        Self { ranks: ranks.collect(), words }
+        pace.part(0.0..0.9).each(candidates, add).await;
+        let (mut before, mut ranks) = (0, Vec::with_capacity(words.len()));
+        let rank = |word: usize| {
+            ranks.push(before);
+            before += words[word].count_ones();
+        };
+        pace.part(0.9..1.0).each(words.len(), rank).await;
+        Self { words, ranks }
     }
 
     /// Whether a voxel is set.

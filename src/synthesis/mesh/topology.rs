@@ -93,7 +93,22 @@ impl MeshTopology {
 
     /// Whether no edge has just one triangle.
     pub fn is_closed(&self) -> bool {
-        self.boundary_edges() == 0
+        at_once(self.is_closed_paced(&Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(crate) async fn is_closed_paced(&self, pace: &Pace) -> bool {
+        let (mut stretch, mut done) = (Stretch::default(), 0);
+        for fan in self.fans() {
+            if fan.len() == 1 {
+                return false;
+            }
+            done += fan.len();
+            if stretch.ends_after(fan.len()) {
+                pace.rest(done as f32 / self.edges.len() as f32).await;
+            }
+        }
+        true
     }
 
     /// Which triangles have an edge that triangles use more often in one direction than in the other. `flip` tells
@@ -161,22 +176,30 @@ impl MeshTopology {
                 balance[patch as usize] += if flip[triangle] { area } else { -area };
             }
         };
-        pace.part(0.8..1.0).each(self.triangles.len(), weigh).await;
-        for (triangle, patch) in patches.of_triangle.iter().enumerate() {
-            if patch.is_some_and(|patch| balance[patch as usize] > 0.0) {
+        pace.part(0.8..0.9).each(self.triangles.len(), weigh).await;
+        let turn = |triangle: usize| {
+            if patches.of_triangle[triangle].is_some_and(|patch| balance[patch as usize] > 0.0) {
                 flip[triangle] = !flip[triangle];
             }
-        }
+        };
+        pace.part(0.9..1.0).each(self.triangles.len(), turn).await;
         flip
     }
 
     /// Parts of the surface joined by edges with exactly two triangles, and whether each part is closed.
     pub(crate) async fn manifold_patches(&self, pace: &Pace) -> (Patches, Vec<bool>) {
-        let patches = self.patches(|fan| fan.len() == 2, |_, _, _| {}, pace).await;
+        let patches = self.patches(|fan| fan.len() == 2, |_, _, _| {}, &pace.part(0.0..0.8)).await;
         let mut closed = vec![true; patches.count];
-        for edge in self.fans().filter(|fan| fan.len() == 1).flatten() {
-            if let Some(patch) = patches.of_triangle[edge.triangle as usize] {
+        let (pace, mut stretch, mut done) = (pace.part(0.8..1.0), Stretch::default(), 0);
+        for fan in self.fans() {
+            if let [edge] = fan
+                && let Some(patch) = patches.of_triangle[edge.triangle as usize]
+            {
                 closed[patch as usize] = false;
+            }
+            done += fan.len();
+            if stretch.ends_after(fan.len()) {
+                pace.rest(done as f32 / self.edges.len() as f32).await;
             }
         }
         (patches, closed)

@@ -45,9 +45,10 @@ impl TriangleIndex {
         pace.part(0.0..0.05).each(mesh.triangles().len(), take).await;
         let bounds = |id: usize| Bounds::around(&mesh.corners(numbers[id] as usize));
         let tree = BoxTree::new_paced(numbers.len(), bounds, &pace.part(0.05..0.9)).await;
-        let triangles: Vec<u32> = tree.order().iter().map(|&id| numbers[id as usize]).collect();
+        let (order, number) = (tree.order(), |slot: usize| numbers[tree.order()[slot] as usize]);
+        let triangles: Vec<u32> = pace.part(0.9..0.92).collect(order.len(), number).await;
         let corner = |slot: usize| mesh.corners(triangles[slot] as usize);
-        let corners = pace.part(0.9..1.0).collect(triangles.len(), corner).await;
+        let corners = pace.part(0.92..1.0).collect(triangles.len(), corner).await;
         Self { tree, corners, triangles }
     }
 

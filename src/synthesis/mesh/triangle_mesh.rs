@@ -6,6 +6,7 @@
 //! [bounds](TriangleMesh::bounds)), smooth [normals](TriangleMesh::vertex_normals) and the
 //! [`topology`](super::topology).
 
+use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::{
     DVec3, Vec2, Vec3,
     bounding::{Aabb3d, BoundingVolume},
@@ -105,6 +106,19 @@ impl TriangleMesh {
     /// # Errors
     /// The first error that makes the mesh unusable: see [`MeshError`].
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, uvs: Option<Vec<Vec2>>) -> Result<Self, MeshError> {
+        at_once(Self::new_paced(positions, triangles, uvs, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub async fn new_paced(
+        positions: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+        uvs: Option<Vec<Vec2>>,
+        pace: &Pace,
+    ) -> Result<Self, MeshError> {
         let (vertices, count) = (positions.len(), triangles.len());
         for (what, count) in [("vertices", vertices), ("triangles", count)] {
             if count > MAX_TRIANGLES {
@@ -114,13 +128,15 @@ impl TriangleMesh {
         if vertices < 3 || count == 0 {
             return Err(MeshError::Empty { vertices, triangles: count });
         }
-        if let Some(vertex) = positions.iter().position(|&position| !is_usable(position)) {
+        if let Some(vertex) = pace.part(0.0..0.4).find(vertices, |vertex| !is_usable(positions[vertex])).await {
             return Err(MeshError::BadPosition { vertex, position: positions[vertex] });
         }
-        for (triangle, corners) in triangles.iter().enumerate() {
-            if let Some(&index) = corners.iter().find(|&&index| index as usize >= vertices) {
-                return Err(MeshError::IndexOutOfRange { triangle, index, vertices });
-            }
+        let is_missing = |index: u32| index as usize >= vertices;
+        let is_damaged = |triangle: usize| triangles[triangle].iter().any(|&index| is_missing(index));
+        if let Some(triangle) = pace.part(0.4..0.9).find(count, is_damaged).await
+            && let Some(&index) = triangles[triangle].iter().find(|&&index| is_missing(index))
+        {
+            return Err(MeshError::IndexOutOfRange { triangle, index, vertices });
         }
         if let Some(uvs) = &uvs
             && uvs.len() != vertices
@@ -128,7 +144,8 @@ impl TriangleMesh {
             return Err(MeshError::UvCount { uvs: uvs.len(), vertices });
         }
         let mesh = Self { positions, triangles, uvs };
-        if (0..count).all(|triangle| mesh.is_degenerate(triangle)) {
+        // The first triangle is the one, nearly always.
+        if pace.part(0.9..1.0).find(count, |triangle| !mesh.is_degenerate(triangle)).await.is_none() {
             return Err(MeshError::NoArea { triangles: count });
         }
         Ok(mesh)
@@ -159,13 +176,20 @@ impl TriangleMesh {
 
     /// The smallest box that holds every vertex that a triangle uses.
     pub fn bounds(&self) -> Aabb3d {
+        at_once(self.bounds_paced(&Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(crate) async fn bounds_paced(&self, pace: &Pace) -> Aabb3d {
         let mut min = Vec3::INFINITY;
         let mut max = Vec3::NEG_INFINITY;
-        for index in self.triangles.iter().flatten() {
-            let position = self.positions[*index as usize];
-            min = min.min(position);
-            max = max.max(position);
-        }
+        let enclose = |triangle: usize| {
+            for position in self.corners(triangle) {
+                min = min.min(position);
+                max = max.max(position);
+            }
+        };
+        pace.each(self.triangles.len(), enclose).await;
         Aabb3d { min: min.into(), max: max.into() }
     }
 
@@ -194,9 +218,15 @@ impl TriangleMesh {
     ///
     /// Negative if triangles face inwards. Meaningless for an open mesh. An overlap of shells counts once for each.
     pub fn signed_volume(&self) -> f64 {
+        at_once(self.signed_volume_paced(&Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(crate) async fn signed_volume_paced(&self, pace: &Pace) -> f64 {
         // Relative to the centre, so that the terms of a mesh far from the origin do not cancel.
-        let origin = self.bounds().center();
-        (0..self.triangles.len()).map(|triangle| tetrahedron_volume(self.corners(triangle), origin.into())).sum()
+        let origin = self.bounds_paced(&pace.part(0.0..0.4)).await.center();
+        let volume = |triangle: usize| tetrahedron_volume(self.corners(triangle), origin.into());
+        pace.part(0.4..1.0).sum(self.triangles.len(), volume).await
     }
 
     /// Unit normal of a triangle, `Vec3::ZERO` if it is degenerate.
@@ -209,12 +239,19 @@ impl TriangleMesh {
 
     /// The same mesh with those triangles reversed for whose number `flip` returns true.
     #[must_use]
-    pub fn with_flipped(mut self, flip: impl Fn(usize) -> bool) -> Self {
-        for (triangle, corners) in self.triangles.iter_mut().enumerate() {
+    pub fn with_flipped(self, flip: impl Fn(usize) -> bool) -> Self {
+        at_once(self.with_flipped_paced(flip, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(crate) async fn with_flipped_paced(mut self, flip: impl Fn(usize) -> bool, pace: &Pace) -> Self {
+        let (count, triangles) = (self.triangles.len(), &mut self.triangles);
+        let turn = |triangle: usize| {
             if flip(triangle) {
-                corners.swap(1, 2);
+                triangles[triangle].swap(1, 2);
             }
-        }
+        };
+        pace.each(count, turn).await;
         self
     }
 }

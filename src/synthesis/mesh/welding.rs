@@ -90,23 +90,28 @@ impl TriangleMesh {
 }
 
 /// Drops triangles with the same three vertices as an earlier one, in any order.
-async fn without_repeats(mut triangles: Vec<[u32; 3]>, pace: &Pace) -> Vec<[u32; 3]> {
+async fn without_repeats(triangles: Vec<[u32; 3]>, pace: &Pace) -> Vec<[u32; 3]> {
     let key = |number: usize| {
         let mut sorted = triangles[number];
         sorted.sort_unstable();
         (sorted, number as u32)
     };
     let mut keys: Vec<([u32; 3], u32)> = pace.part(0.0..0.2).collect(triangles.len(), key).await;
-    pace.part(0.2..0.9).sort(&mut keys).await;
-    let mut repeats: Vec<u32> = keys.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1).collect();
-    repeats.sort_unstable();
-    let mut number = 0;
-    triangles.retain(|_| {
-        number += 1;
-        repeats.binary_search(&(number - 1)).is_err()
-    });
-    pace.rest(1.0).await;
-    triangles
+    pace.part(0.2..0.8).sort(&mut keys).await;
+    let mut is_repeat = vec![false; triangles.len()];
+    let compare = |pair: usize| {
+        let [(first, _), (second, number)] = [keys[pair], keys[pair + 1]];
+        is_repeat[number as usize] = first == second;
+    };
+    pace.part(0.8..0.9).each(keys.len().saturating_sub(1), compare).await;
+    let mut kept = Vec::with_capacity(triangles.len());
+    let keep = |number: usize| {
+        if !is_repeat[number] {
+            kept.push(triangles[number]);
+        }
+    };
+    pace.part(0.9..1.0).each(triangles.len(), keep).await;
+    kept
 }
 
 fn hash(position: Vec3) -> u64 {

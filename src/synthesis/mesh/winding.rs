@@ -17,8 +17,8 @@ const PROBES: usize = 9;
 pub(crate) async fn oriented(mesh: TriangleMesh, index: &TriangleIndex, pace: &Pace) -> (TriangleMesh, Vec<bool>) {
     let topology = mesh.topology_paced(&pace.part(0.0..0.5)).await;
     let misoriented = topology.misoriented_paced(&mesh, &pace.part(0.5..0.7)).await;
-    let mesh = mesh.with_flipped(|triangle| misoriented[triangle]);
-    let (patches, closed) = topology.manifold_patches(&pace.part(0.7..0.8)).await;
+    let mesh = mesh.with_flipped_paced(|triangle| misoriented[triangle], &pace.part(0.7..0.72)).await;
+    let (patches, closed) = topology.manifold_patches(&pace.part(0.72..0.8)).await;
     let volumes = shell_volumes(&mesh, &patches, &pace.part(0.8..0.9)).await;
     let pace = pace.part(0.9..1.0);
     let largest =
@@ -30,11 +30,12 @@ pub(crate) async fn oriented(mesh: TriangleMesh, index: &TriangleIndex, pace: &P
         return (mesh, loose);
     }
     let mut members = vec![Vec::new(); patches.count];
-    for (triangle, patch) in patches.of_triangle.iter().enumerate() {
-        if let Some(patch) = patch {
-            members[*patch as usize].push(triangle);
+    let enter = |triangle: usize| {
+        if let Some(patch) = patches.of_triangle[triangle] {
+            members[patch as usize].push(triangle);
         }
-    }
+    };
+    pace.part(0.0..0.2).each(patches.of_triangle.len(), enter).await;
     let facing_right = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| !against[patch as usize]);
     let mut flip: Vec<bool> = Vec::with_capacity(patches.count);
     for patch in 0..patches.count {
@@ -46,8 +47,9 @@ pub(crate) async fn oriented(mesh: TriangleMesh, index: &TriangleIndex, pace: &P
         }
     }
     let turned = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| flip[patch as usize]);
-    let loose = topology.unbalanced_paced(|triangle| misoriented[triangle] != turned(triangle), &pace).await;
-    (mesh.with_flipped(turned), loose)
+    let was_turned = |triangle: usize| misoriented[triangle] != turned(triangle);
+    let loose = topology.unbalanced_paced(was_turned, &pace.part(0.2..0.8)).await;
+    (mesh.with_flipped_paced(turned, &pace.part(0.8..1.0)).await, loose)
 }
 
 /// Signed volume of every part of the surface.

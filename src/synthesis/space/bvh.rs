@@ -120,7 +120,7 @@ impl BoxTree {
     pub async fn new_paced(count: usize, box_of: impl Fn(usize) -> Bounds, pace: &Pace) -> Self {
         let item = |id: usize| Item { bounds: box_of(id), id: id as u32, bin: 0 };
         let mut items: Vec<Item> = pace.part(0.0..0.1).collect(count, item).await;
-        let pace = pace.part(0.1..1.0);
+        let (pace, last) = (pace.part(0.1..0.95), pace.part(0.95..1.0));
         let mut stretch = Stretch::default();
         let mut nodes: Vec<Node> = Vec::with_capacity(items.len());
         // Ranges that are not nodes yet, with the node whose second child they are.
@@ -163,8 +163,7 @@ impl BoxTree {
             pending.push((middle, end, Some(index), depth + 1));
             pending.push((start, middle, None, depth + 1));
         }
-        let order = items.iter().map(|item| item.id).collect();
-        pace.rest(1.0).await;
+        let order = last.collect(count, |slot| items[slot].id).await;
         Self { nodes, order }
     }
 

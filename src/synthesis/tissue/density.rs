@@ -2,6 +2,7 @@
 
 use crate::synthesis::{
     mesh::{IndexedMesh, TriangleMesh},
+    pace::{Pace, at_once},
     random::VesselRng,
     tissue::{
         Extent, NoGoField, Tissue, TissuePiece, TissuePoint,
@@ -37,7 +38,7 @@ impl DensityField {
     /// # Errors
     /// A number of values other than one per vertex, or a value that is NaN.
     pub fn on_vertices(mesh: &TriangleMesh, values: &[f32]) -> Result<Self, TissueError> {
-        let values = check(values, mesh.positions().len())?;
+        let values = at_once(check(values, mesh.positions().len(), &Pace::default()))?;
         Ok(Self(Field::Vertices { mesh: IndexedMesh::new(mesh.clone()), values }))
     }
 
@@ -46,7 +47,12 @@ impl DensityField {
     /// # Errors
     /// Those of [`on_vertices`](Self::on_vertices).
     pub fn on_indexed(mesh: &IndexedMesh, values: &[f32]) -> Result<Self, TissueError> {
-        let values = check(values, mesh.mesh().positions().len())?;
+        at_once(Self::on_indexed_paced(mesh, values, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(super) async fn on_indexed_paced(mesh: &IndexedMesh, values: &[f32], pace: &Pace) -> Result<Self, TissueError> {
+        let values = check(values, mesh.mesh().positions().len(), pace).await?;
         Ok(Self(Field::Vertices { mesh: mesh.clone(), values }))
     }
 
@@ -66,7 +72,8 @@ impl DensityField {
         if expected == 0 {
             return Err(TissueError::DensityCount { values: values.len(), expected: 1 });
         }
-        Ok(Self(Field::Grid { size, spacing, origin, values: check(values, expected)? }))
+        let values = at_once(check(values, expected, &Pace::default()))?;
+        Ok(Self(Field::Grid { size, spacing, origin, values }))
     }
 
     /// The field's value at a point, from 0 to 1.
@@ -90,14 +97,14 @@ impl fmt::Debug for DensityField {
     }
 }
 
-fn check(values: &[f32], expected: usize) -> Result<Arc<[f32]>, TissueError> {
+async fn check(values: &[f32], expected: usize, pace: &Pace) -> Result<Arc<[f32]>, TissueError> {
     if values.len() != expected {
         return Err(TissueError::DensityCount { values: values.len(), expected });
     }
-    if let Some(index) = values.iter().position(|value| value.is_nan()) {
+    if let Some(index) = pace.part(0.0..0.5).find(expected, |index| values[index].is_nan()).await {
         return Err(TissueError::DensityNotANumber { index });
     }
-    Ok(values.iter().map(|value| value.clamp(0.0, 1.0)).collect())
+    Ok(pace.part(0.5..1.0).collect(expected, |index| values[index].clamp(0.0, 1.0)).await.into())
 }
 
 /// Linear interpolation along each axis between the eight values around a place on the grid.

@@ -156,10 +156,11 @@ impl Mask {
         if mask.set.is_empty() {
             return Err(TissueError::EmptyMask);
         }
-        let runs = mask.list_runs(&pace.part(0.5..0.6)).await;
-        mask.bounds = runs.iter().fold(Bounds::EMPTY, |bounds, &run| bounds.with(run));
-        mask.index = BoxTree::new_paced(runs.len(), |run| runs[run], &pace.part(0.6..1.0)).await;
-        mask.runs = mask.index.order().iter().map(|&id| runs[id as usize]).collect();
+        let (runs, bounds) = mask.list_runs(&pace.part(0.5..0.6)).await;
+        mask.bounds = bounds;
+        mask.index = BoxTree::new_paced(runs.len(), |run| runs[run], &pace.part(0.6..0.95)).await;
+        let run = |slot: usize| runs[mask.index.order()[slot] as usize];
+        mask.runs = pace.part(0.95..1.0).collect(runs.len(), run).await;
         Ok(mask)
     }
 
@@ -168,19 +169,22 @@ impl Mask {
         self.set.len()
     }
 
-    /// Runs of set cells along x.
-    async fn list_runs(&self, pace: &Pace) -> Vec<Bounds> {
+    /// Runs of set cells along x, and the box around all of them.
+    async fn list_runs(&self, pace: &Pace) -> (Vec<Bounds>, Bounds) {
+        let mut bounds = Bounds::EMPTY;
         let (mut runs, mut stretch, mut done) = (Vec::new(), Stretch::default(), 0);
         for run in self.set.chunk_by(|&a, &b| b == a + 1 && !(b as usize).is_multiple_of(self.size[0])) {
             let min = self.corner(run[0] as usize, Vec3::ZERO);
             let max = self.corner(run[run.len() - 1] as usize, Vec3::ONE);
-            runs.push(Bounds { min: min.into(), max: max.into() });
+            let run_bounds = Bounds { min: min.into(), max: max.into() };
+            bounds = bounds.with(run_bounds);
+            runs.push(run_bounds);
             done += run.len();
             if stretch.ends_after(run.len()) {
                 pace.rest(done as f32 / self.set.len() as f32).await;
             }
         }
-        runs
+        (runs, bounds)
     }
 
     /// The point at a position within a cell, from 0 to 1 along each axis.

@@ -4,8 +4,8 @@
 //! [`PreparedTissue::painted`](super::PreparedTissue::painted) lays it over a prepared tissue, which is cheap: a brush
 //! stroke prepares nothing again.
 
-use super::{NoGoRegion, TissueError, no_go::NoGoField};
-use crate::synthesis::mesh::IndexedMesh;
+use super::{GuidePath, NoGoRegion, TissueError, no_go::NoGoField};
+use crate::synthesis::{mesh::IndexedMesh, pace::Pace};
 use bevy_math::Vec3;
 
 /// The paint over the tissue of an organ. The default is blank.
@@ -38,6 +38,21 @@ impl TissuePaint {
     pub fn is_blank(&self) -> bool {
         self.density.is_none() && self.no_go.is_empty() && self.guides.is_empty()
     }
+
+    /// Whether some of it is painted on the vertices of a mesh.
+    pub(super) fn is_on_vertices(&self) -> bool {
+        self.density.is_some() || self.no_go.vertices.is_some()
+    }
+
+    /// How much work it is to lay it over a tissue that has been prepared, in items: vertices, and pieces of guides.
+    pub fn work(&self) -> usize {
+        /// A value costs a small part of what an item of other work does.
+        const VALUES_OF_AN_ITEM: usize = 16;
+        let vertices = [self.density.as_ref().map(Vec::len), self.no_go.vertices.as_ref().map(Vec::len)];
+        let values: usize = vertices.into_iter().flatten().sum();
+        let guides: usize = self.guides.iter().map(|guide| GuidePath::work(guide.points.len())).sum();
+        values / VALUES_OF_AN_ITEM + guides
+    }
 }
 
 /// Where no vessel may be: no attraction point, root or node is placed there, not even along guides.
@@ -68,16 +83,16 @@ impl NoGo {
     }
 
     /// The field of these regions, `None` if nothing is forbidden. `mesh` is only called if vertices are painted.
-    pub(super) fn field<'a>(
+    pub(super) async fn field<'a>(
         &self,
         mesh: impl FnOnce() -> Result<&'a IndexedMesh, TissueError>,
+        pace: &Pace,
     ) -> Result<Option<NoGoField>, TissueError> {
-        let regions = NoGoField::regions(self.regions.iter().copied())?;
-        let painted = self.vertices.as_ref().map(|painted| NoGoField::on_vertices(mesh()?, painted)).transpose()?;
-        Ok((!self.is_empty()).then(|| match painted {
-            Some(painted) => regions.or(painted),
-            None => regions,
-        }))
+        let mut field = NoGoField::regions(self.regions.iter().copied())?;
+        if let Some(painted) = &self.vertices {
+            field = field.or(NoGoField::on_vertices_paced(mesh()?, painted, pace).await?);
+        }
+        Ok((!self.is_empty()).then_some(field))
     }
 }
 

@@ -2,6 +2,7 @@
 //! 4).
 
 use crate::synthesis::{
+    mesh::is_usable,
     pace::{Pace, SHORT_STRETCH, at_once},
     random::VesselRng,
     space::bvh::{Bounds, BoxTree},
@@ -20,6 +21,8 @@ use std::{ops::Range, sync::Arc};
 
 /// Pieces that a guide is cut into when it is laid on another tissue.
 const PIECES: f32 = 256.0;
+/// What it costs to lay one of them, in items of other work.
+const WORK_OF_PIECE: usize = 8;
 /// Most points of a guide.
 const MAX_POINTS: usize = 1 << 20;
 /// Most tries at a sample.
@@ -58,7 +61,21 @@ impl GuidePath {
     /// # Errors
     /// Fewer than two points, points that all coincide, coordinates that are not finite, a deviation below 0.
     pub fn new(points: Vec<Vec3>, deviation: f32) -> Result<Self, TissueError> {
-        Self::build(points, [check_deviation(deviation)?; 2])
+        at_once(Self::new_paced(points, deviation, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub async fn new_paced(points: Vec<Vec3>, deviation: f32, pace: &Pace) -> Result<Self, TissueError> {
+        Self::build(points, [check_deviation(deviation)?; 2], pace).await
+    }
+
+    /// How much work it is to lay a guide of so many points [over](Self::over) a tissue, in items. Each piece takes two
+    /// searches for the nearest point.
+    pub(super) fn work(points: usize) -> usize {
+        WORK_OF_PIECE * (points + PIECES as usize)
     }
 
     /// The same guide with a deviation that changes linearly to this value at its end.
@@ -83,6 +100,7 @@ impl GuidePath {
     /// # Errors
     /// Those of [`over`](Self::over).
     pub async fn over_paced(self, base: Arc<dyn Tissue>, pace: &Pace) -> Result<Self, TissueError> {
+        let (laying, building, measuring) = (pace.part(0.0..0.4), pace.part(0.4..0.6), pace.part(0.6..1.0));
         let spacing = self.length() / PIECES;
         let mut points = vec![base.closest_point(self.points[0]).position];
         for (number, pair) in self.points.windows(2).enumerate() {
@@ -90,11 +108,11 @@ impl GuidePath {
             for piece in 1..=pieces as u32 {
                 points.push(base.closest_point(pair[0].lerp(pair[1], piece as f32 / pieces)).position);
                 if points.len().is_multiple_of(SHORT_STRETCH) {
-                    pace.rest(0.5 * number as f32 / self.points.len() as f32).await;
+                    laying.rest(number as f32 / self.points.len() as f32).await;
                 }
             }
         }
-        let mut laid = Self::build(points, self.deviations)?;
+        let mut laid = Self::build(points, self.deviations, &building).await?;
         let mut widest = 0.0f32;
         let measure = |gaps: Range<usize>| {
             for gap in gaps {
@@ -102,29 +120,31 @@ impl GuidePath {
                 widest = widest.max(base.closest_point(middle).position.distance(middle));
             }
         };
-        pace.part(0.5..1.0).stretches(laid.points.len() - 1, SHORT_STRETCH, measure).await;
+        measuring.stretches(laid.points.len() - 1, SHORT_STRETCH, measure).await;
         laid.slack = 2.0 * widest;
         laid.base = Some(base);
         Ok(laid)
     }
 
-    fn build(points: Vec<Vec3>, deviations: [f32; 2]) -> Result<Self, TissueError> {
+    async fn build(points: Vec<Vec3>, deviations: [f32; 2], pace: &Pace) -> Result<Self, TissueError> {
         if points.len() < 2 || points.len() > MAX_POINTS {
             return Err(TissueError::GuidePoints { points: points.len(), limit: MAX_POINTS });
         }
-        for &point in &points {
-            finite_point("a point of a guide", point)?;
+        if let Some(bad) = pace.part(0.0..0.1).find(points.len(), |point| !is_usable(points[point])).await {
+            finite_point("a point of a guide", points[bad])?;
         }
         let mut length = 0.0;
         let mut lengths = vec![0.0];
-        for pair in points.windows(2) {
-            length += pair[0].distance(pair[1]);
+        let measure = |segment: usize| {
+            length += points[segment].distance(points[segment + 1]);
             lengths.push(length);
-        }
+        };
+        pace.part(0.1..0.2).each(points.len() - 1, measure).await;
         if !(length > 0.0 && length.is_finite()) {
             return Err(TissueError::GuideLength { length });
         }
-        let index = BoxTree::new(points.windows(2).map(Bounds::around));
+        let around = |segment: usize| Bounds::around(&points[segment..segment + 2]);
+        let index = BoxTree::new_paced(points.len() - 1, around, &pace.part(0.2..1.0)).await;
         Ok(Self { points, lengths, deviations, index, base: None, slack: 0.0 })
     }
 

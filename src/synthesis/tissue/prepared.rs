@@ -74,6 +74,11 @@ impl PreparedTissue {
         &self.plain
     }
 
+    /// The mesh that it is made of, with the texture coordinates that came with it; `None` for other tissues.
+    pub fn mesh(&self) -> Option<&TriangleMesh> {
+        self.canvas.as_ref().map(|canvas| &*canvas.mesh)
+    }
+
     /// The tissue with paint laid over it. Nothing is prepared again. With blank paint, this is the
     /// [`tissue`](Self::tissue) itself.
     ///
@@ -94,12 +99,17 @@ impl PreparedTissue {
         if paint.is_blank() {
             return Ok(Arc::clone(&self.plain));
         }
-        if let (Some(canvas), true) = (&self.canvas, paint.density.is_some() || paint.no_go.vertices.is_some()) {
-            canvas.index(&pace.part(0.0..0.5)).await;
+        if let (Some(canvas), true) = (&self.canvas, paint.is_on_vertices()) {
+            canvas.index(&pace.part(0.0..0.4)).await;
         }
-        let density = |values| DensityField::on_indexed(self.canvas("the density")?, values);
-        let density = paint.density.as_deref().map(density).transpose()?;
-        let no_go = paint.no_go.field(|| self.canvas("a no-go region"))?;
+        let density = match &paint.density {
+            Some(values) => {
+                let canvas = self.canvas("the density")?;
+                Some(DensityField::on_indexed_paced(canvas, values, &pace.part(0.4..0.45)).await?)
+            }
+            None => None,
+        };
+        let no_go = paint.no_go.field(|| self.canvas("a no-go region"), &pace.part(0.45..0.5)).await?;
         let laid = |tissue: &Arc<dyn Tissue>| guarded(thinned(Arc::clone(tissue), density.as_ref())?, no_go.as_ref());
         // Guides lie on the first stage.
         let base = self.stages.first().map_or(&self.last, |(first, _)| first);
@@ -108,8 +118,8 @@ impl PreparedTissue {
         for (number, guide) in paint.guides.iter().enumerate() {
             let share = 1.0 / paint.guides.len() as f32;
             let pace = pace.part(number as f32 * share..(number + 1) as f32 * share);
-            let path = GuidePath::new(guide.points.clone(), guide.deviation)?;
-            let path = path.over_paced(Arc::clone(base), &pace).await?;
+            let path = GuidePath::new_paced(guide.points.clone(), guide.deviation, &pace.part(0.0..0.1)).await?;
+            let path = path.over_paced(Arc::clone(base), &pace.part(0.1..1.0)).await?;
             stages.push((guarded(Arc::new(path), no_go.as_ref())?, guide.steps));
         }
         for (stage, steps) in &self.stages {
@@ -119,15 +129,12 @@ impl PreparedTissue {
         in_stages(stages, laid(&self.last)?)
     }
 
-    /// Work of laying this paint over the tissue, in items: vertices, and triangles if their index has still to be
-    /// made.
+    /// Work of laying this paint over the tissue, in items: that of the [paint](TissuePaint::work), and triangles if
+    /// their index has still to be made.
     pub fn painting_work(&self, paint: &TissuePaint) -> usize {
-        let vertices = [paint.density.as_ref().map(Vec::len), paint.no_go.vertices.as_ref().map(Vec::len)];
-        let painted = vertices.iter().flatten().sum::<usize>();
-        let is_bare = |canvas: &&Arc<Canvas>| painted > 0 && canvas.indexed.get().is_none();
+        let is_bare = |canvas: &&Arc<Canvas>| paint.is_on_vertices() && canvas.indexed.get().is_none();
         let triangles = self.canvas.as_ref().filter(is_bare).map_or(0, |canvas| canvas.mesh.triangles().len());
-        // A value costs a small part of an item of other work.
-        triangles + painted / 16
+        triangles + paint.work()
     }
 
     fn canvas(&self, what: &'static str) -> Result<&IndexedMesh, TissueError> {

@@ -48,19 +48,21 @@ impl MeshSurface {
     pub async fn new_paced(mesh: impl Into<Arc<TriangleMesh>>, pace: &Pace) -> Result<Self, TissueError> {
         let indexed = IndexedMesh::new_paced(mesh.into(), &pace.part(0.0..0.5)).await;
         let mesh = indexed.mesh();
-        let bounds = mesh.bounds();
-        let faces_inwards = mesh.signed_volume() < 0.0 && mesh.topology_paced(&pace.part(0.5..0.6)).await.is_closed();
+        let bounds = mesh.bounds_paced(&pace.part(0.5..0.52)).await;
+        let faces_inwards = mesh.signed_volume_paced(&pace.part(0.52..0.55)).await < 0.0
+            && mesh.topology_paced(&pace.part(0.55..0.6)).await.is_closed_paced(&pace.part(0.6..0.61)).await;
         let facing = if faces_inwards { -1.0 } else { 1.0 };
-        let welding = mesh.weld_paced(&pace.part(0.6..0.7)).await;
-        let mut normals = mesh.vertex_normals_paced(&welding, &pace.part(0.7..0.9)).await;
-        normals.iter_mut().for_each(|normal| *normal *= facing);
+        let welding = mesh.weld_paced(&pace.part(0.61..0.7)).await;
+        let mut normals = mesh.vertex_normals_paced(&welding, &pace.part(0.7..0.85)).await;
+        let vertices = normals.len();
+        pace.part(0.85..0.87).each(vertices, |vertex| normals[vertex] *= facing).await;
         let area = |triangle| if mesh.is_degenerate(triangle) { 0.0 } else { mesh.triangle_area(triangle) };
-        let areas: Vec<f64> = pace.part(0.9..1.0).collect(mesh.triangles().len(), area).await;
+        let areas: Vec<f64> = pace.part(0.87..0.9).collect(mesh.triangles().len(), area).await;
         Ok(Self {
             normals,
             facing,
-            picks: AliasTable::new(areas.iter().copied()),
-            area: areas.iter().sum::<f64>() as f32,
+            area: pace.part(0.9..0.91).sum(areas.len(), |triangle| areas[triangle]).await as f32,
+            picks: AliasTable::new_paced(areas.len(), |triangle| areas[triangle], &pace.part(0.91..1.0)).await,
             tolerance: (bounds.max - bounds.min).max_element() * SURFACE_TOLERANCE,
             bounds,
             indexed,

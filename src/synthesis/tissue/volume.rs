@@ -92,8 +92,9 @@ impl MeshVolume {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub async fn new_paced(mesh: &TriangleMesh, resolution: u32, pace: &Pace) -> Result<Self, TissueError> {
-        let grid = Grid::over(&mesh.bounds(), resolution)?;
-        let mesh = mesh.welded_paced(&pace.part(0.0..0.1)).await;
+        let bounds = mesh.bounds_paced(&pace.part(0.0..0.01)).await;
+        let grid = Grid::over(&bounds, resolution)?;
+        let mesh = mesh.welded_paced(&pace.part(0.01..0.1)).await;
         let index = TriangleIndex::new_paced(&mesh, &pace.part(0.1..0.25)).await;
         let (mesh, loose) = oriented(mesh, &index, &pace.part(0.25..0.4)).await;
         let closed = !loose.contains(&true);
@@ -108,7 +109,7 @@ impl MeshVolume {
         let mut volume = Self {
             whole: inside.list(&pace.part(0.86..0.88)).await,
             corners,
-            bounds: mesh.bounds(),
+            bounds: mesh.bounds_paced(&pace.part(0.88..0.89)).await,
             volume: 0.0,
             closed,
             grid,
@@ -118,7 +119,7 @@ impl MeshVolume {
             cells,
             triangles,
         };
-        volume.volume = volume.measure(&pace.part(0.88..1.0)).await;
+        volume.volume = volume.measure(&pace.part(0.89..1.0)).await;
         if volume.volume > 0.0 { Ok(volume) } else { Err(TissueError::NoInside { resolution }) }
     }
 
@@ -278,11 +279,9 @@ async fn cells(
         // Counted one entry further, so that the running sum gives each voxel's beginning.
         cells[slot + 1].first += 1;
     };
-    pace.part(0.2..0.5).each(touches.len(), count).await;
-    for slot in 1..cells.len() {
-        cells[slot].first += cells[slot - 1].first;
-    }
-    let mut next: Vec<u32> = cells.iter().map(|cell| cell.first).collect();
+    pace.part(0.2..0.4).each(touches.len(), count).await;
+    pace.part(0.4..0.45).each(voxels.len(), |slot| cells[slot + 1].first += cells[slot].first).await;
+    let mut next: Vec<u32> = pace.part(0.45..0.5).collect(cells.len(), |slot| cells[slot].first).await;
     let mut triangles = vec![0; touches.len()];
     let place = |touch: usize| {
         let (voxel, triangle) = touches[touch];

@@ -2,6 +2,7 @@
 
 use crate::synthesis::{
     mesh::IndexedMesh,
+    pace::{Pace, at_once},
     tissue::error::{TissueError, finite_point, positive},
 };
 use bevy_math::Vec3;
@@ -90,11 +91,20 @@ impl NoGoField {
     /// # Errors
     /// A number of entries other than one per vertex.
     pub fn on_vertices(mesh: &IndexedMesh, painted: &[bool]) -> Result<Self, TissueError> {
+        at_once(Self::on_vertices_paced(mesh, painted, &Pace::default()))
+    }
+
+    /// The same, with rests.
+    pub(in crate::synthesis::tissue) async fn on_vertices_paced(
+        mesh: &IndexedMesh,
+        painted: &[bool],
+        pace: &Pace,
+    ) -> Result<Self, TissueError> {
         let expected = mesh.mesh().positions().len();
         if painted.len() != expected {
             return Err(TissueError::NoGoCount { values: painted.len(), expected });
         }
-        let values = painted.iter().map(|&painted| f32::from(painted)).collect();
+        let values = pace.collect(expected, |vertex| f32::from(painted[vertex])).await.into();
         Ok(Self(vec![Part::Vertices { mesh: mesh.clone(), values }]))
     }
 
