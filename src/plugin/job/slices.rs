@@ -47,7 +47,7 @@ impl<T> Place<T> {
 /// The time at which the slices of a frame end.
 struct SliceClock {
     zero: Instant,
-    /// Nanoseconds since then.
+    /// Nanoseconds since `zero`.
     end: AtomicU64,
 }
 
