@@ -1,7 +1,7 @@
-//! How fast vessels grow, and why the index over nodes is a grid.
+//! The speed of growth, and of the grid that indexes nodes compared with other indices.
 //!
-//! `cargo bench --bench growth` runs everything; a part of a name after `--` chooses, such as `cargo bench --bench growth --
-//! reference`. Times of a shared machine are loose: compare lines of one run.
+//! `cargo bench --bench growth` runs everything; a part of a name after `--` selects benchmarks, such as
+//! `cargo bench --bench growth -- reference`. Times on a shared machine vary: compare only lines of one run.
 
 use bevy_math::{Vec3, bounding::Aabb3d};
 use bevy_vessels::synthesis::{
@@ -17,7 +17,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use std::{hint::black_box, path::Path, sync::Arc};
 
-/// What grows: a tissue, settings that fit it, and roots.
+/// A growth to measure: a tissue, settings that fit it, and roots.
 struct Case {
     tissue: Arc<dyn Tissue>,
     settings: ColonizationSettings,
@@ -60,7 +60,7 @@ fn nodes(growth: &Colonization) -> usize {
     Colonization::KINDS.map(|kind| growth.tree(kind).len()).iter().sum()
 }
 
-/// The cases that the paper's own program was measured on, each with and without a second thread.
+/// The cases on which the paper's own program was measured, each with and without a second thread.
 fn reference(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("reference");
     for (name, case) in [
@@ -80,8 +80,8 @@ fn reference(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// From ten thousand nodes to a million, with samples and lengths to match: 20 samples a node of the arteries. Nodes a second
-/// are what should stay.
+/// From ten thousand nodes to a million, with samples and lengths to match: 20 samples per arterial node. The nodes per
+/// second should stay constant.
 fn scale(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("scale");
     group.sample_size(10);
@@ -117,10 +117,10 @@ fn scale(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The questions of a growth to an index over nodes, asked of the grid, of kiddo and of all points in turn.
+/// The queries of a growth on its nodes, with the grid, with kiddo and by brute force.
 ///
-/// kiddo's tree stands for a point set that stays. Growth adds points between questions, for which that tree would have to be
-/// built anew, and its tree that takes points refuses those that share a coordinate.
+/// kiddo's tree is for a fixed point set. Growth adds points between queries, so that tree would have to be rebuilt,
+/// and kiddo's mutable tree refuses points that share a coordinate.
 fn index(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("index");
     for count in [1000, 10_000, 100_000] {

@@ -1,16 +1,16 @@
-//! CPU time of a frame in main and render world: an empty scene, a million segments at rest, and as they grow.
+//! CPU time of a frame in main and render world: an empty scene, and a million segments at rest and growing.
 //!
-//! `cargo bench --bench idle -- [SEGMENTS]` prints milliseconds, the median of many frames, and how much more they are than
-//! those of an empty scene, frame for frame. Two apps run in turn, and each frame that counts follows one with vessels, so
-//! that both meet the same machine, and caches that a software driver has emptied.
+//! `cargo bench --bench idle -- [SEGMENTS]` prints milliseconds, as medians of many frames, and the differences to an
+//! empty scene, frame by frame. Two apps run in turn, and each measured frame follows one with vessels, so that both
+//! meet the same machine, and caches that a software driver has emptied.
 //!
-//! Times are those of all threads together, at work, so that what else runs on the machine and waiting for a graphics card
-//! don't count. Any adapter will do. What the driver does with a frame's commands, once all are there, has a column of its
-//! own: a software driver draws then, within the call that submits them and on threads of its own. On a graphics card that
-//! column is the cost of submitting.
+//! Times are CPU times of all threads together, so other load on the machine and waiting for a graphics card don't
+//! count. Any adapter will do. The driver's work on a frame's commands, once all are submitted, has its own column: a
+//! software driver draws then, within the submitting call and on its own threads. On a graphics card that column is the
+//! cost of submitting.
 //!
-//! One camera, one light with shadows in four cascades; the vessels are far away, so that a software driver has little to
-//! draw, but all chunks are drawn in all views.
+//! There is one camera and one light with shadows in four cascades. The vessels are far away, so that a software driver
+//! has little to draw, but all chunks are drawn in all views.
 
 #[expect(dead_code, reason = "no pictures are written here")]
 #[path = "../examples/common/headless.rs"]
@@ -48,7 +48,7 @@ fn main() {
     let (mut empty, mut full) = (scene(), scene());
     let vessels = spawn_vessels(&mut full, segments);
     let idle = measure([&mut empty, &mut full], |_| {});
-    // what a step changes in a large tree: a tenth of its segments, scattered
+    // the changes of a step in a large tree: a tenth of its segments, scattered
     let growing = measure([&mut empty, &mut full], |world| {
         let mut log = world.get_mut::<ChangeLog>(vessels).expect("required by vessels");
         log.mark((0..segments).step_by(10));
@@ -63,7 +63,7 @@ fn main() {
     report("more than empty", &differences(&growing));
 }
 
-/// A camera, a light with shadows, and nothing to see.
+/// A camera, a light with shadows, and an empty scene.
 fn scene() -> App {
     let mut app = App::new();
     app.add_plugins((
@@ -82,7 +82,7 @@ fn scene() -> App {
     app
 }
 
-/// One vessel that winds through a ball, so that every chunk reaches everywhere, as in an organ.
+/// One vessel that winds through a ball, so that every chunk spans the whole ball, as in an organ.
 fn spawn_vessels(app: &mut App, segments: usize) -> Entity {
     let place = |node: usize| {
         let turn = node as f32 * 2.399_963;
@@ -135,15 +135,15 @@ fn update(app: &mut App) -> Times {
     [main, extract, render, main + extract + render, submission].map(|time| time.as_secs_f64() * 1000.0)
 }
 
-/// How long the last frame was in the hands of the driver.
+/// Time that the driver took for the last frame.
 #[derive(Resource)]
 struct Submission {
     begin: ProcessTime,
     taken: Duration,
 }
 
-/// Takes the time from the call that hands over the frame's commands until all of them have been carried out: a software
-/// driver draws within that call and on threads of its own, and is idle in the rest of the frame.
+/// Measures the time from submitting the frame's commands until all have been carried out. A software driver draws
+/// within that call and on its own threads, and is idle in the rest of the frame.
 fn time_submission(app: &mut App) {
     let begin = |mut submission: ResMut<Submission>| submission.begin = ProcessTime::now();
     let end = |mut submission: ResMut<Submission>, device: Res<RenderDevice>| {
@@ -161,7 +161,7 @@ fn time_submission(app: &mut App) {
         );
 }
 
-/// What each frame of the second app took longer than that of the first beside it.
+/// Time by which each frame of the second app exceeds the corresponding frame of the first.
 fn differences([empty, full]: &[Vec<Times>; 2]) -> Vec<Times> {
     let difference = |(empty, full): (&Times, &Times)| std::array::from_fn(|column| full[column] - empty[column]);
     empty.iter().zip(full).map(difference).collect()

@@ -1,7 +1,7 @@
-//! Time of a frame, without drawing, in which vessels are cut, bleed, and follow an organ that deforms.
+//! Time of a frame, without drawing, in which vessels are cut, bleed, and follow a deforming organ.
 //!
-//! `cargo bench --bench surgery -- [SEGMENTS]` prints milliseconds on the clock of all systems of a frame, least, median and
-//! most, at a quarter, a half and all of the segments: so what grows faster than the organ is seen.
+//! `cargo bench --bench surgery -- [SEGMENTS]` prints the wall time of all systems of a frame in milliseconds, least,
+//! median and most, for a quarter, a half and all of the segments. This shows costs that grow faster than the organ.
 
 use bevy::{
     asset::AssetPlugin,
@@ -74,7 +74,7 @@ fn operate(segments: usize) {
     report(segments, "all undone", &undone);
 }
 
-/// An app without a window, and a ball of 0.2 m with vessels on it, with all that takes time made.
+/// An app without a window, and a ball of 0.2 m with vessels on it, with all jobs done.
 fn organ(segments: usize) -> (App, Entity) {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, VesselPlugin::default()));
@@ -98,12 +98,12 @@ fn organ(segments: usize) -> (App, Entity) {
         app.update();
         sleep(Duration::from_millis(5));
     }
-    // vessels are bound to the organ beside the frames, too
+    // jobs also bind vessels to the organ
     measure(&mut app, |world, frame| breathe(world, organ, frame));
     (app, organ)
 }
 
-/// Vessels over a ball that branch in two, each with half of the piece of skin that its parent has.
+/// Vessels over a ball that branch in two, each with half of its parent's piece of skin.
 fn tree(segments: usize) -> VesselTree {
     let depth = |node: usize| (node + 1).ilog2();
     let radius = |node: usize| 0.0012 * ops::exp2(-(depth(node) as f32) / 3.0);
@@ -129,7 +129,7 @@ fn tree(segments: usize) -> VesselTree {
     VesselTree::from_arrays(positions, parents, radii).expect("a tree")
 }
 
-/// A scalpel that goes around the ball.
+/// Moves a scalpel around the ball.
 fn sweep(world: &mut World, stroke: StrokeId, frame: usize) {
     let edge = |frame: usize| {
         let angle = 0.02 * frame as f32;
@@ -151,7 +151,7 @@ fn breathe(world: &mut World, organ: Entity, frame: usize) {
     }
 }
 
-/// What all systems of each frame took, in milliseconds.
+/// Time of all systems in each frame, in milliseconds.
 fn measure(app: &mut App, mut change: impl FnMut(&mut World, usize)) -> Vec<f64> {
     let frame = |frame| {
         change(app.world_mut(), frame);
@@ -172,7 +172,7 @@ fn report(segments: usize, what: &str, times: &[f64]) {
     );
 }
 
-/// How much there is that bleeds.
+/// Prints the number of open ends.
 fn tell(app: &mut App) {
     let world = app.world_mut();
     let ends = world.query::<&OpenEnd>().iter(world).len();

@@ -1,18 +1,18 @@
 //! Arteries and veins grow over a procedural colon, and over the mucosa inside it.
 //!
-//! Every seed is another colon. Turn it with the left mouse button, move it with the right, zoom with the wheel.
+//! Every seed gives another colon. Turn it with the left mouse button, move it with the right, zoom with the wheel.
 //!
 //! | key | |
 //! |---|---|
-//! | space | pause, go on |
+//! | space | pause, resume |
 //! | `.` | one step |
 //! | `N` | the next seed |
 //! | `A`, `V` | arteries, veins on and off |
 //! | `C` | colour by kind, radius, age, Strahler order |
-//! | `I` | look from inside; then ↑ and ↓ travel along the lumen |
+//! | `I` | view from inside; then ↑ and ↓ travel along the lumen |
 //!
-//! `--mesh FILE.glb` takes an organ of your own, in any unit. `--headless` draws to files instead of a window, as it does
-//! where there is no display: `cargo run --release --example colon -- --headless --out DIR`.
+//! `--mesh FILE.glb` takes your own organ, in any unit. `--headless` draws to files instead of a window, which is also
+//! the behaviour without a display: `cargo run --release --example colon -- --headless --out DIR`.
 
 mod common;
 #[path = "common/endoscopy.rs"]
@@ -66,7 +66,7 @@ fn spawn_organ(mut commands: Commands, args: Res<Args>) {
     }
 }
 
-/// `N`: the next seed's organ takes the place of this one.
+/// `N`: the next seed's organ replaces this one.
 fn next_seed(
     keys: Res<ButtonInput<KeyCode>>,
     mut commands: Commands,
@@ -80,7 +80,7 @@ fn next_seed(
     }
 }
 
-/// The colon of the seed. Its outer and its inner side are organs of their own, joined by a rim.
+/// The colon of the seed. Its outer and inner sides are separate organs, joined by a rim.
 fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) -> Result {
     let colon = ColonSettings { seed: args.organ.seed, triangles: 120_000, ..default() }.generate()?;
     let place = to_unit_size(colon.mesh.bounds());
@@ -108,7 +108,7 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     Ok(())
 }
 
-/// The organ of a file.
+/// The organ from a file.
 fn spawn_loaded(
     loaded: On<OrganLoaded>,
     mut commands: Commands,

@@ -1,7 +1,8 @@
 //! Cut, bleed, clamp: an operation on the vessels of a colon that breathes.
 //!
-//! Let the vessels grow, then drag with the right mouse button: a scalpel cuts along the cursor's way, and what it severs
-//! bleeds, as fast as pressure and radius say. Turn with the left button, move with the middle one, zoom with the wheel.
+//! Let the vessels grow, then drag with the right mouse button: a scalpel cuts along the cursor's path, and severed
+//! vessels bleed at a rate given by pressure and radius. Turn with the left button, move with the middle one, zoom with
+//! the wheel.
 //!
 //! | key | |
 //! |---|---|
@@ -10,10 +11,10 @@
 //! | `B` | cautery under the cursor, while it is held |
 //! | `Z` | undo |
 //! | space | pause growth and bleeding |
-//! | `A`, `V`, `C` | arteries, veins, what colours tell: the last pales what lacks blood |
+//! | `A`, `V`, `C` | arteries, veins, meaning of the colours: the last pales vessels without blood |
 //!
-//! `--mesh FILE.glb` takes an organ of your own, in metres. `--headless --script demo --out DIR` makes the same cut, clamp
-//! and cautery on any machine and writes pictures and `blood_loss.csv`, as it does where there is no display.
+//! `--mesh FILE.glb` takes your own organ, in metres. `--headless --script demo --out DIR` makes the same cut, clamp
+//! and cautery on any machine and writes pictures and `blood_loss.csv`. This is also the behaviour without a display.
 
 #[path = "common/blood.rs"]
 mod blood;
@@ -66,7 +67,7 @@ use wish::OrganArgs;
 struct Args {
     #[command(flatten)]
     organ: OrganArgs,
-    /// What is done where there is no window.
+    /// The operation without a window.
     #[arg(long, value_enum, default_value_t)]
     script: Script,
 }
@@ -84,7 +85,7 @@ fn main() -> AppExit {
         .run()
 }
 
-/// Blood under the pressure of a beating heart.
+/// Blood under pulsatile pressure.
 fn perfusion() -> impl Bundle {
     let arterial_pressure = RootPressure::Pulsatile(Pulse::default());
     (Perfusion { scale: Scale::METRES, arterial_pressure, ..default() }, FollowsMesh)
@@ -107,7 +108,7 @@ fn spawn_organ(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets)
     Ok(())
 }
 
-/// The organ of a file.
+/// The organ from a file.
 fn spawn_loaded(loaded: On<OrganLoaded>, mut commands: Commands, args: Res<Args>, mut assets: OrganAssets) -> Result {
     commands.insert_resource(Surface::new(&loaded.mesh, &loaded.place, front_view().eye)?);
     let tint = args.organ.tint(OrganArgs::FLESH);

@@ -1,7 +1,7 @@
 //! The presets side by side: six networks of one seed on discs, and one through the inside of a procedural liver.
 //!
-//! The discs are those of Fig. 5 of Rauch & Harders (2021): the paper's arteries and veins, then what a larger exponent κ, a
-//! larger direction weight ω, and a smaller and a larger bifurcation threshold φ make of them.
+//! The discs are those of Fig. 5 of Rauch & Harders (2021): the paper's arteries and veins, then those with a larger
+//! exponent κ, a larger direction weight ω, and a smaller and a larger bifurcation threshold φ.
 //!
 //! Keys as on the screen. `--headless --out DIR` writes `discs.png` and `liver.png`.
 
@@ -27,12 +27,12 @@ use common::{
 struct Args {
     #[command(flatten)]
     studio: StudioArgs,
-    /// Which of the networks that a preset can give.
+    /// Seed of the networks.
     #[arg(long, default_value_t = 3)]
     seed: u64,
 }
 
-/// What is on each disc: caption, preset, and the one kind of vessels to show where it isn't both.
+/// The contents of each disc: caption, preset, and the kind of vessels to show if not both.
 const DISCS: [(&str, PresetName, Option<VesselKind>); 6] = [
     ("arteries", PresetName::Paper, Some(VesselKind::Artery)),
     ("veins", PresetName::Paper, Some(VesselKind::Vein)),
@@ -41,7 +41,7 @@ const DISCS: [(&str, PresetName, Option<VesselKind>); 6] = [
     ("smaller phi: symmetric", PresetName::Symmetric, Some(VesselKind::Artery)),
     ("larger phi: lateral branches", PresetName::Lateral, Some(VesselKind::Artery)),
 ];
-/// Where the liver is, beside the discs.
+/// Position of the liver, beside the discs.
 const LIVER: Vec3 = Vec3::new(3.2, 0.0, 0.0);
 
 fn main() -> AppExit {
@@ -55,7 +55,7 @@ fn main() -> AppExit {
         .run()
 }
 
-/// Vessels with their radii multiplied, so that they show from afar.
+/// Vessels with their radii multiplied, so that they are visible from afar.
 fn stouter(mut wish: Vasculature, radii: f32) -> Vasculature {
     let settings = wish.generator.colonization_mut().expect("presets colonize");
     settings.arterial.terminal_radius *= radii;
@@ -90,7 +90,7 @@ fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let place = to_unit_size(liver.mesh.bounds());
     let place = place.with_translation(place.translation + LIVER);
     let mut wish = stouter(Vasculature::new(PresetName::Liver).with_seed(args.seed), 2.0);
-    // Coarser than the preset, so that one can look through.
+    // Coarser than the preset, so that the inside is visible.
     wish.generator = wish.generator.scaled(1.5);
     wish.roots.artery = RootPlacement::Nearest(liver.roots.arterial.clone());
     wish.roots.vein = RootPlacement::Nearest(liver.roots.venous.clone());

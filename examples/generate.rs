@@ -5,7 +5,7 @@
 //! ```
 //!
 //! You see a progress bar and a line per organ; `--help` lists all options. Organ number k has seed `--seed` + k and is
-//! the same whatever the count, the shard and the number of threads, so an array job takes `--shard $TASK/$TASKS`.
+//! the same for any count, shard and number of threads, so an array job uses `--shard $TASK/$TASKS`.
 
 #[path = "generate/command.rs"]
 mod command;

@@ -1,16 +1,16 @@
-//! Many organs grow at once within one budget of time per frame: what that costs is printed at the end.
+//! Many organs grow at once within one time budget per frame; the costs are printed at the end.
 //!
 //! You see discs on which arteries and veins spread, all at the same pace. Turn them with the left mouse button, move them
 //! with the right, zoom with the wheel.
 //!
 //! | key | |
 //! |---|---|
-//! | space | pause, go on |
+//! | space | pause, resume |
 //! | `.` | one step |
 //! | `N` | the next seeds |
 //! | `A`, `V`, `C` | arteries, veins, colours |
 //!
-//! `--headless` grows them without window and renderer, and ends with them:
+//! `--headless` grows them without window and renderer, and then exits:
 //! `cargo run --release --example stress -- --headless --organs 100 --budget 2`.
 
 #[expect(dead_code, reason = "other examples share more")]
@@ -34,13 +34,13 @@ use std::time::Duration;
 struct Args {
     #[command(flatten)]
     studio: StudioArgs,
-    /// How many.
+    /// Number of organs.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
     organs: u32,
-    /// Milliseconds that their growth may take in each frame, all together.
+    /// Milliseconds that the growth of all organs may take in each frame.
     #[arg(long, default_value_t = 2.0)]
     budget: f32,
-    /// Factor for the lengths of the paper's settings: the smaller, the more nodes. By default about 6,000.
+    /// Factor for the lengths of the paper's settings: smaller values give more nodes. The default gives about 6,000.
     #[arg(long, default_value_t = 0.75)]
     lengths: f32,
 }
@@ -50,7 +50,7 @@ struct Args {
 struct Record {
     growth: Vec<Duration>,
     frames: Vec<Duration>,
-    /// Steps of the organ that was furthest behind when the first one had done all of its own.
+    /// Steps of the slowest organ when the first one had finished.
     slowest: Option<u32>,
     told: bool,
 }
@@ -90,7 +90,7 @@ fn spawn_organs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets
     }
 }
 
-/// `N`: all grow again, from other seeds.
+/// `N`: all organs grow again, from other seeds.
 fn next_seeds(keys: Res<ButtonInput<KeyCode>>, mut organs: Query<&mut Vasculature>, mut record: ResMut<Record>) {
     if keys.just_pressed(KeyCode::KeyN) {
         let count = organs.iter().len() as u64;

@@ -20,15 +20,15 @@
 //! ([`colonization`](synthesis::colonization)) → [`VesselTree`](synthesis::tree::VesselTree) → what is drawn
 //! ([`instances`](synthesis::instances)) or written ([`io`](synthesis::io)).
 //!
-//! - [`synthesis`] makes vessels and knows no engine. Use it alone, without default features, for batches of organs.
-//! - [`plugin`] brings it into a world: components, a time budget for each frame, messages. There vessels can be cut and
-//!   bleed, too: see [`Cuttable`](plugin::Cuttable) and [`Perfusion`](plugin::Perfusion).
+//! - [`synthesis`] makes vessels without an engine. Use it alone, without default features, for batches of organs.
+//! - [`plugin`] brings it into a Bevy world: components, a time budget for each frame, messages. Vessels can also be
+//!   cut and bleed: see [`Cuttable`](plugin::Cuttable) and [`Perfusion`](plugin::Perfusion).
 //! - [`render`] draws the segments by instancing while they grow.
 //!
 //! # Units
 //!
-//! All lengths are in the local space of the organ's mesh, whatever its unit. Presets fit themselves to the organ's
-//! size. Angles in settings are in degrees.
+//! All lengths are in the local space of the organ's mesh, in any unit. Presets fit themselves to the organ's size.
+//! Angles in settings are in degrees.
 //!
 //! # Features
 //!
@@ -40,21 +40,21 @@
 //! | `serialize` | with `plugin` | settings and presets as RON files |
 //! | `mesh_files` | no | organ meshes from GLB, glTF and OBJ files without Bevy |
 //!
-//! # Questions that come up
+//! # Frequent questions
 //!
 //! **Is an organ the same at another frame rate, thread count or platform?** Yes. A step depends on settings and seed
-//! alone; the time budget only decides how many steps a frame takes.
+//! alone; the time budget only decides how many steps run in a frame.
 //!
 //! **My organ is in millimetres.** Nothing to do: see Units.
 //!
-//! **My organ bleeds by the litre, or not at all.** Blood has a size: say how long a unit of the mesh is, in
+//! **My organ bleeds by the litre, or not at all.** Flow depends on real size: set the length of a unit of the mesh in
 //! [`Perfusion::scale`](plugin::Perfusion::scale).
 //!
-//! **My organ is a soft body.** Put [`FollowsMesh`](plugin::FollowsMesh) on it, and its vessels follow its surface; or
-//! [`FollowsTetrahedra`](plugin::FollowsTetrahedra), and they follow its inside.
+//! **My organ is a soft body.** Put [`FollowsMesh`](plugin::FollowsMesh) on it, and its vessels follow its surface.
+//! With [`FollowsTetrahedra`](plugin::FollowsTetrahedra) they follow its inside.
 //!
-//! **Why does nothing grow?** Look at the entity's [`GrowthProgress`](plugin::GrowthProgress) and the log: a mesh that
-//! cannot be used, or settings outside their limits, are named there with what to change.
+//! **Why does nothing grow?** Look at the entity's [`GrowthProgress`](plugin::GrowthProgress) and the log. They name an
+//! unusable mesh, or settings outside their limits, and say what to change.
 
 pub mod synthesis;
 
@@ -63,14 +63,14 @@ pub mod plugin;
 #[cfg(feature = "render")]
 pub mod render;
 
-/// What most apps with vessels name: `use bevy_vessels::prelude::*`.
+/// The names that most apps with vessels need: `use bevy_vessels::prelude::*`.
 #[cfg(feature = "plugin")]
 pub mod prelude {
     pub use crate::VesselPlugin;
     pub use crate::plugin::{
-        Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, FollowsTetrahedra, GrowthAction, GrowthBudget,
-        GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, OrganPaint,
-        Perfusion, SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystems, Vessels,
+        Cuttable, CuttableVessels, EntityCommandsExt, FollowsMesh, GrowthAction, GrowthBudget, GrowthCommand,
+        GrowthControl, GrowthFailed, GrowthFinished, GrowthPhase, GrowthProgress, OpenEnd, OrganPaint, Perfusion,
+        SegmentColoring, StrokeId, Vasculature, VesselAppearance, VesselSystems, Vessels,
     };
     pub use crate::synthesis::colonization::ColonizationSettings;
     pub use crate::synthesis::generator::Generator;
@@ -87,10 +87,10 @@ use bevy::{
     ecs::schedule::ScheduleLabel,
 };
 
-/// Everything that an app with vessels needs: growth, surgery, blood, deformation, and drawing where the app draws.
+/// Everything that an app with vessels needs: growth, surgery, blood, deformation, and drawing if the app draws.
 ///
-/// Add it after `DefaultPlugins`. In an app without a renderer vessels grow all the same. Each part is a plugin of its own:
-/// an app that only grows vessels may add [`GrowthPlugin`](plugin::GrowthPlugin) alone.
+/// Add it after `DefaultPlugins`. Vessels also grow in an app without a renderer. Each part is a plugin of its own: an
+/// app that only grows vessels may add [`GrowthPlugin`](plugin::GrowthPlugin) alone.
 #[cfg(feature = "plugin")]
 #[derive(Clone, Debug, Default)]
 pub struct VesselPlugin {
@@ -111,7 +111,7 @@ pub struct VesselPlugin {
 
 #[cfg(feature = "plugin")]
 impl VesselPlugin {
-    /// Runs everything but drawing in another schedule than `Update`.
+    /// Runs everything but drawing in a schedule other than `Update`.
     #[must_use]
     pub fn in_schedule(self, schedule: impl ScheduleLabel) -> Self {
         let schedule = schedule.intern();
@@ -140,3 +140,8 @@ impl Plugin for VesselPlugin {
         app.add_plugins(self.segments.clone());
     }
 }
+
+/// The code of the README, compiled.
+#[cfg(all(doctest, feature = "render"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,4 +1,4 @@
-//! A warm step allocates nothing: a growth that is started again finds all the memory it needs.
+//! A warm step allocates nothing: a restarted growth already has all the memory that it needs.
 
 use bevy_vessels::synthesis::{
     colonization::{Colonization, ColonizationSettings},
@@ -63,7 +63,7 @@ fn assert_warm(
 
 #[test]
 fn steps_of_a_growth_that_is_started_again_allocate_nothing() -> Result<(), Box<dyn Error>> {
-    // One thread: handing work to others is not a growth's own doing.
+    // One thread, since sharing work with others allocates outside the growth.
     let disc: Arc<dyn Tissue> = Arc::new(Disc::flat(0.5)?);
     let ball: Arc<dyn Tissue> = Arc::new(Ball::new(Default::default(), 0.5)?);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;

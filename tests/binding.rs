@@ -1,4 +1,4 @@
-//! Vessels that follow an organ: rigid motions, stretching, bending, seams, tetrahedra, and what is refused.
+//! Vessels that follow an organ: rigid motions, stretching, bending, seams, tetrahedra, and errors.
 
 use bevy_math::{Affine3A, Mat3, Quat, Vec3};
 use bevy_vessels::synthesis::{
@@ -32,7 +32,7 @@ fn size(mesh: &TriangleMesh) -> f32 {
     Vec3::from(bounds.max - bounds.min).max_element()
 }
 
-/// Points on a mesh, or up to a share of its size off it.
+/// Points on a mesh, or off it by up to a share of its size.
 fn points_near(mesh: &TriangleMesh, off: f32, count: usize, seed: u64) -> Vec<Vec3> {
     let mut rng = Stream::Statistics.rng(seed);
     let reach = off * size(mesh);
@@ -93,7 +93,7 @@ fn stretching_keeps_vessels_on_the_surface() {
     }
 }
 
-/// Winds what lies along an axis around another: a plane x = c becomes one at an angle.
+/// Bends one axis around another: a plane x = c becomes one at an angle.
 fn bend(p: Vec3, radius: f32) -> Vec3 {
     let (sin, cos) = (p.x / radius).sin_cos();
     Vec3::new((radius + p.y) * sin, (radius + p.y) * cos - radius, p.z)
@@ -109,7 +109,7 @@ fn bending_keeps_vessels_at_their_distance_from_the_surface() {
         let bent_normals = after.vertex_normals();
         let distance = 1.0e-3 * size(&mesh);
         let picked: Vec<usize> = (0..mesh.positions().len()).step_by(7).filter(|&v| normals[v] != Vec3::ZERO).collect();
-        // On the triangle nearest to a point above a vertex the vertex itself may not be nearest: those are left out.
+        // Leaves out points above a vertex whose nearest place on the mesh is not that vertex.
         let index = bevy_vessels::synthesis::mesh::TriangleIndex::new(&mesh);
         let above = |v: usize| mesh.positions()[v] + distance * normals[v];
         let clear = |&v: &usize| {
@@ -132,7 +132,7 @@ fn bending_keeps_vessels_at_their_distance_from_the_surface() {
 
 #[test]
 fn the_triangle_is_the_nearest_by_brute_force() {
-    // Each triangle apart from the others moves its own way, so that where a node goes says what it is bound to.
+    // Each triangle is separate and moves differently, so that a node's new position shows its triangle.
     let mut rng = Stream::Roots.rng(4);
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for triangle in 0..80u32 {
@@ -140,7 +140,7 @@ fn the_triangle_is_the_nearest_by_brute_force() {
         positions.extend((0..3).map(|_| center + 0.2 * any_point(&mut rng)));
         triangles.push([0, 1, 2].map(|corner| 3 * triangle + corner));
     }
-    // Degenerate triangles right beside the nodes are left out.
+    // Degenerate triangles right beside the nodes must be ignored.
     positions.extend([Vec3::ZERO; 3]);
     triangles.push([240, 241, 242]);
     let mesh = TriangleMesh::new(positions, triangles, None).unwrap();
@@ -173,7 +173,7 @@ fn sampled_distance(point: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
 
 #[test]
 fn seams_do_not_show() {
-    // A roof of two slopes; its ridge has every vertex twice, as a seam of a UV chart has.
+    // A roof of two slopes; its ridge has every vertex twice, like a seam of a UV chart.
     let ridge = [Vec3::new(0.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0)];
     let at = |x: f32| [Vec3::new(x, 0.0, 0.0), Vec3::new(x, 1.0, 0.0)];
     let positions = [at(-1.0), ridge, ridge, at(1.0)].concat();
@@ -222,7 +222,7 @@ fn cube(n: u32) -> TetMesh {
 fn tetrahedra_carry_nodes_through_an_affine_map() {
     let mesh = cube(5);
     let mut rng = Stream::Statistics.rng(8);
-    // Some outside, up to half as far as the cube is wide.
+    // Some are outside, by up to half the width of the cube.
     let rest = chain((0..2000).map(|i| any_point(&mut rng) * if i % 5 == 0 { 1.5 } else { 1.0 }).collect());
     let mut binding = Binding::to_tetrahedra(&rest, &mesh);
     let map = Affine3A::from_mat3_translation(

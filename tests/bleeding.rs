@@ -1,4 +1,4 @@
-//! Bleeding over time against published figures and what must hold of any wound.
+//! Bleeding over time against published figures and laws for any wound.
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
@@ -21,7 +21,7 @@ fn tube(segments: usize, length: f32, radius: f32) -> VesselTree {
     VesselTree::from_arrays(positions, parents, vec![radius; segments + 1]).expect("a well-formed tree")
 }
 
-/// A tree of vessels of 2 mm to 0.1 mm in which any node has any earlier one as its parent.
+/// A tree of vessels of 2 mm to 0.1 mm in which each node's parent is any earlier one.
 fn tree(seed: u64, nodes: usize) -> VesselTree {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let positions = (0..nodes).map(|_| Vec3::from(std::array::from_fn(|_| rng.random_range(-9.0..9.0_f32)))).collect();
@@ -52,7 +52,7 @@ fn bleeding() -> Bleeding {
     Bleeding::new(BleedingSettings::default()).expect("valid numbers")
 }
 
-/// What one proximal end of a network lets out at once.
+/// The initial flow out of one proximal end of a network.
 fn rate(tree: &VesselTree, settings: FlowSettings, node: u32, gap: Interruption) -> Flow {
     let mut network = Network::new(tree, settings).expect("valid numbers");
     network.set_interruption(NodeId(node), Some(gap)).expect("valid numbers");
@@ -85,12 +85,12 @@ fn a_sheeps_carotid_bleeds_as_measured() {
 #[test]
 fn small_vessels_bleed_what_their_own_resistance_lets_through() {
     for (diameter, mmhg, expected) in [(0.1_f32, 50.0, 0.14), (0.2, 60.0, 1.35)] {
-        // Twice the length, cut in its middle.
+        // Twice the length, cut in the middle.
         let tree = tube(1, 40.0 * diameter, 0.5 * diameter);
-        // Out of a wide hole the resistance alone limits.
+        // Out of a wide hole, only the resistance limits the flow.
         let free = rate(&tree, at(mmhg), 1, cut_off(5.0 * diameter)).ml_per_min();
         assert!((free / expected - 1.0).abs() < 0.02, "{diameter} mm: {free} mL/min");
-        // Out of its own end, neither limit is passed, and the flow is what both in series let through.
+        // Out of its own end, neither limit is exceeded, and the flow is that of both in series.
         let found = rate(&tree, at(mmhg), 1, cut_off(0.5 * diameter)).ml_per_min();
         let area = PI * (0.5e-3 * f64::from(diameter)).powi(2);
         let orifice = 0.29 * area * (2.0 * Pressure::from_mmhg(mmhg).pascals() / 1060.0).sqrt();
@@ -126,7 +126,7 @@ fn a_wider_vessel_and_a_higher_pressure_bleed_more() {
 
 #[test]
 fn nothing_bleeds_behind_a_clamp_and_all_of_it_once_released() {
-    // The bed has no more pressure than the air, so that nothing bleeds back.
+    // The bed has atmospheric pressure, so that nothing bleeds back.
     let mut settings = at(95.0);
     settings.bed.pressure = Pressure::ZERO;
     for seed in 0..20 {
@@ -260,7 +260,7 @@ fn a_patient_bleeds_out_and_no_further() {
     assert!(bleeding.rate().ml_per_min() < 100.0 && blood.pressure_share() < 0.01);
 }
 
-/// An artery and a vein of a resisting bed, cut in three places each.
+/// An artery and a vein with a resisting bed, cut in three places each.
 fn cut_pair(resistance: f64) -> [Network; 2] {
     let resisting = Some(Resistance::from_mmhg_min_per_ml(resistance));
     let pulse = RootPressure::Pulsatile(Pulse::default());
@@ -301,7 +301,7 @@ fn arteries_and_veins_without_links_bleed_as_each_alone() {
 #[test]
 fn a_cut_vein_bleeds_what_its_artery_brings_until_that_is_clamped() {
     let [mut artery, mut vein] = cut_pair(0.5);
-    // No pool but the links: all that the vein has comes from the artery.
+    // Links without a pool: all blood in the vein comes from the artery.
     for network in [&mut artery, &mut vein] {
         network.set_interruptions(&[]).unwrap();
     }
@@ -312,7 +312,7 @@ fn a_cut_vein_bleeds_what_its_artery_brings_until_that_is_clamped() {
         |i: usize| BedLink { arterial: NodeId(tips[0][i % tips[0].len()]), venous: NodeId(tips[1][i % tips[1].len()]) };
     let links: Vec<BedLink> = (0..most).map(link).collect();
     let mut circulation = Circulation::new(artery, vein, &links).unwrap();
-    // The veins' root is closed, so that the cut is their only way out.
+    // The veins' root is closed, so that the cut is their only outlet.
     for node in trees[1].segments().filter(|&(_, parent)| parent == 0).map(|(node, _)| node as u32) {
         let outlet = Some(Outlet { radius: 1.0 });
         let gap = Interruption { distal: outlet, ..Interruption::clamp(0.5) };
@@ -331,8 +331,8 @@ fn a_cut_vein_bleeds_what_its_artery_brings_until_that_is_clamped() {
 
 #[test]
 fn severed_small_vessels_lose_little_before_they_clot() {
-    // One tree of vessels of 130 to 5 µm, all of whose segments are severed at once (Tsiklidis 2019: below 100 mL in
-    // 2 min with normal clotting).
+    // A tree of vessels of 130 to 5 µm with all segments severed at once (Tsiklidis 2019: below 100 mL in 2 min with
+    // normal clotting).
     let mut small = tree(3, 400);
     small = VesselTree::from_arrays(
         small.positions().to_vec(),
@@ -370,7 +370,7 @@ fn what_begins_and_stops_is_told_once() {
     network.set_interruption(NodeId(2), Some(cut_off(0.5))).unwrap();
     assert_eq!(step(&mut network, 0.1), [(2, true)]);
     assert_eq!(step(&mut network, 0.1), []);
-    // Another cut nearer to the root takes the pressure away.
+    // Another cut nearer to the root removes the pressure.
     network.set_interruption(NodeId(1), Some(cut_off(0.5))).unwrap();
     let mut changes = step(&mut network, 0.1);
     changes.sort_unstable();

@@ -1,4 +1,4 @@
-//! The same seed grows the same vessels, bit for bit: however often, in whatever portions, on any number of threads.
+//! The same seed grows the same vessels, bit for bit: in repeated runs, any portions, and on any number of threads.
 
 mod common;
 
@@ -15,7 +15,7 @@ use bevy_vessels::synthesis::{
 use common::{Case, tissues};
 use std::{collections::BTreeMap, sync::Arc};
 
-/// Many samples a step, so that threads share the work where they can, and few steps.
+/// Many samples per step, so that threads share the work, and few steps.
 fn settings() -> ColonizationSettings {
     ColonizationSettings { steps: 30, samples: 5000, ..ColonizationSettings::default() }
 }
@@ -24,7 +24,7 @@ fn start(case: &Case, seed: u64) -> Colonization {
     Colonization::new(case.tissue.clone(), settings(), &case.roots, seed).expect("settings within limits")
 }
 
-/// Everything that a growth gives, as one number and the normals' bits.
+/// All results of a growth, as one number and the normals' bits.
 fn outcome(growth: &Colonization) -> (u64, Vec<u32>) {
     let channels = Colonization::KINDS.into_iter().flat_map(|kind| {
         let normals = growth.normals(kind).iter().flat_map(|normal| normal.to_array()).map(f32::to_bits);
@@ -59,7 +59,7 @@ fn portions_of_steps_change_nothing() {
         for portion in [1, 3, 7] {
             let mut growth = start(&case, 7);
             while !growth.is_finished() {
-                // Between portions, everything is looked at as a frame would.
+                // Between portions, all results are read, as in a frame.
                 for _ in 0..portion {
                     growth.step();
                 }
@@ -109,7 +109,7 @@ fn growths_that_share_threads_change_nothing() {
         let alone: Vec<u64> = (0..4).map(|seed| grown(&case, seed).0).collect();
         for threads in [2, 5] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            // While one waits for its own work, its thread grows others.
+            // While one growth waits for its own work, its thread runs others.
             let together: Vec<u64> =
                 pool.install(|| (0..40).into_par_iter().map(|seed| grown(&case, seed % 4).0).collect());
             let expected = alone.iter().cycle().take(40);
@@ -123,7 +123,7 @@ fn a_restart_leaves_no_trace_of_what_was() {
     for case in tissues() {
         let mut growth = start(&case, 3);
         growth.run();
-        // Something quite different in between: other lengths, hence another grid, and other channels in use.
+        // A very different growth in between: other lengths, hence another grid, and other channels in use.
         let other = ColonizationSettings { steps: 8, ..settings().scaled(2.5) };
         let mut alone = case.roots.clone();
         alone.placed.vein = RootPlacement::None;
@@ -162,8 +162,8 @@ fn seeds_differ() {
     }
 }
 
-/// What the built-in presets grow, as of this version. Whoever changes a hash says so in the changelog: the organs of all
-/// seeds change with it.
+/// The results of the built-in presets in this version. A changed hash must be noted in the changelog, since the organs
+/// of all seeds change with it.
 #[test]
 fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
     let colon = ColonSettings::default().generate()?;

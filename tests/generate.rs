@@ -1,4 +1,4 @@
-//! The batch command: the same organ whatever the split of the work, whole files, clear errors.
+//! The batch command: the same organ for any split of the work, whole files, clear errors.
 
 #[path = "../examples/generate/command.rs"]
 mod command;
@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Runs the command on a small organ and gives its lines of JSON without the time, which differs from run to run.
+/// Runs the command on a small organ and returns its lines of JSON without the time, which differs between runs.
 fn generate(arguments: &[&str]) -> Vec<Value> {
     let text = output(&[&["--json"], arguments].concat()).expect("organs");
     let line = |line: &str| {
@@ -28,7 +28,7 @@ fn output(arguments: &[&str]) -> Result<String, command::Failure> {
     run(&[&["--steps=12", "--samples=300"], arguments].concat())
 }
 
-/// Runs the command as it is.
+/// Runs the command with these arguments only.
 fn run(arguments: &[&str]) -> Result<String, command::Failure> {
     let all = [&["generate"], arguments].concat();
     let options = command::Options::try_parse_from(all).map_err(|error| command::Failure::Usage(error.to_string()))?;
@@ -42,7 +42,7 @@ fn failure(arguments: &[&str]) -> (u8, String) {
     (failure.exit_code(), failure.to_string())
 }
 
-/// A folder of a test's own, removed at its end.
+/// A temporary folder of a test, removed at its end.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -92,7 +92,7 @@ fn an_organ_is_the_same_whatever_count_shard_and_threads() {
 #[test]
 fn a_line_has_the_fields_that_scripts_read() {
     let text = output(&["--json", "--tissue=box"]).expect("an organ");
-    // In their order, which the parsed object does not keep.
+    // In this order, which the parsed object does not keep.
     let keys = ["tissue", "preset", "seed", "steps", "grow_ms", "hash", "arterial", "venous", "files"];
     let mut at = 0;
     for key in keys {
@@ -173,7 +173,7 @@ fn one_value_is_set_by_its_path() {
     assert_ne!(hash(&["--set", "roots.artery=Nearest([(0.5, 0, 0), (-0.5, 0, 0)])"]), plain);
     assert_ne!(hash(&["--set", "venous.tissue_growth=Exponential(0.01)"]), plain);
     assert_eq!(generate(&["--set=steps=99"])[0]["steps"], 12, "an option of its own counts more");
-    // Infinite thresholds survive being set and being left alone.
+    // Infinite thresholds survive being set and being left unchanged.
     let longer = ["--steps=40", "--samples=1000"];
     let lateral = hash(&[&longer[..], &["--set", "arterial.bifurcation_threshold=inf"]].concat());
     assert_ne!(lateral, hash(&longer));
@@ -195,7 +195,7 @@ fn lengths_are_scaled_and_settings_come_from_a_file() {
     assert!(coarse["arterial"]["nodes"].as_u64() < line["arterial"]["nodes"].as_u64());
 }
 
-/// A tetrahedron as a file, the least organ there is.
+/// A tetrahedron as a file, the smallest possible organ.
 fn tetrahedron(folder: &Folder) -> String {
     let path = folder.path("tetra.obj");
     fs::write(&path, "v 0 0 0\nv 3 0 0\nv 0 3 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n").expect("a file");
@@ -208,7 +208,7 @@ fn an_organs_mesh_grows_on_its_surface_in_its_volume_and_in_stages() {
     let path = tetrahedron(&folder);
     let mut hashes = Vec::new();
     for mode in ["surface", "volume", "staged"] {
-        // A volume needs more drains than a surface for vessels to hear them.
+        // A volume needs more drains than a surface for vessels to perceive them.
         let options = ["--tissue", &path, "--mode", mode, "--steps=25", "--samples=1000", "--lengths=2", "--count=3"];
         let lines = generate(&[&options[..], &["--threads=3"]].concat());
         assert_eq!(lines, generate(&[&options[..], &["--threads=1"]].concat()));
@@ -316,7 +316,8 @@ fn what_goes_wrong_is_named_with_exit_code_1_and_leaves_nothing_half_done() {
         assert!(message.contains(named) && !message.contains('\n'), "{arguments:?}: {message}");
     }
     assert_eq!(fs::read_to_string(&file).expect("a file"), "in the way");
-    // A folder has the name of the second organ's file: the first is whole, of the second there is nothing.
+    // A folder has the name of the second organ's file: the first organ's file is whole, and the second's does not
+    // exist.
     let out = folder.path("out");
     fs::create_dir_all(folder.path("out/disc_paper_2.csv")).expect("a folder");
     let (code, message) = failure(&["--count=100000", "--threads=2", "--out", &out, "--format=csv", "--json"]);
@@ -329,7 +330,7 @@ fn what_goes_wrong_is_named_with_exit_code_1_and_leaves_nothing_half_done() {
     assert!(names.len() < 40, "the batch goes on after a failure");
 }
 
-/// A pipe that nobody reads.
+/// A closed pipe.
 struct Closed;
 
 impl std::io::Write for Closed {

@@ -1,4 +1,4 @@
-//! What holds of the vessels after every single step, for every tissue, every kind of settings and several seeds.
+//! Invariants of the vessels after every single step, for every tissue, every kind of settings and several seeds.
 
 mod common;
 
@@ -14,10 +14,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// Steps of each run, fewer than the default so that the matrix stays quick, at the default lengths.
 const STEPS: u32 = 50;
 const SAMPLES: u32 = 500;
-/// How far a node that is brought back may be from the tissue, in tissue lengths of a tissue of size 1: rounding alone.
+/// Largest distance from the tissue of a node that is brought back, for a tissue of size 1: only rounding.
 const ON_TISSUE: f32 = 1e-5;
 
-/// Default settings in which one thing is changed for both systems.
+/// Default settings with one change for both systems.
 fn varied(change: impl Fn(&mut SystemSettings)) -> ColonizationSettings {
     let mut settings = ColonizationSettings { steps: STEPS, samples: SAMPLES, ..ColonizationSettings::default() };
     change(&mut settings.arterial);
@@ -55,7 +55,7 @@ fn settings() -> Vec<(&'static str, ColonizationSettings)> {
     ]
 }
 
-/// One run, with what it was before the present step.
+/// One run, with its state before the present step.
 struct Run<'a> {
     case: &'a Case,
     growth: Colonization,
@@ -126,7 +126,7 @@ impl<'a> Run<'a> {
         assert_eq!(venous_before + arterial.supplied, venous.drains_left + venous.supplied);
     }
 
-    /// What was there is there still; every channel has one entry per node.
+    /// Old nodes are unchanged; every channel has one entry per node.
     fn check_append_only(&self, kind: VesselKind, step: u32) {
         let (index, growth) = (kind.index(), &self.growth);
         let (before, now) = (&self.before[index], growth.tree(kind));
@@ -139,7 +139,7 @@ impl<'a> Run<'a> {
         assert_eq!((now.len(), now.len()), (births.len(), growth.normals(kind).len()));
     }
 
-    /// New segments are as long as a step, and leave nodes that may have another child.
+    /// New segments are as long as a step, and leave from nodes that may have another child.
     fn check_new_segments(&self, kind: VesselKind) {
         let (growth, tree) = (&self.growth, self.growth.tree(kind));
         let settings = growth.settings().system(kind).expect("it is grown");
@@ -150,7 +150,7 @@ impl<'a> Run<'a> {
             let length = tree.segment_vector(node).length();
             assert!(length > 0.0, "node {node} lies on its parent");
             if growth.settings().confine {
-                // Its free end is a step from its parent, hence at most a step from the tissue.
+                // Its free end is one step from its parent, hence at most one step from the tissue.
                 assert!(length <= 2.0 * step * 1.001, "segment {node} of length {length}, step {step}");
             } else {
                 assert!((length / step - 1.0).abs() < 1e-3, "segment {node} of length {length}, step {step}");
@@ -167,7 +167,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Murray's law at every node, in f64 and with the powers of std; and what is said of changed radii.
+    /// Murray's law at every node, in f64 and with the powers of std, and the list of changed radii.
     fn check_radii(&self, kind: VesselKind) {
         let (tree, before) = (self.growth.tree(kind), &self.before[kind.index()]);
         let exponent = f64::from(self.growth.settings().system(kind).expect("it is grown").bifurcation_exponent);
@@ -210,7 +210,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// What is drawn: the tree, lifted off a surface by its radius.
+    /// The drawn tree, lifted off a surface by its radius.
     fn check_vessels(&self, kind: VesselKind) {
         let (tree, normals) = (self.growth.tree(kind), self.growth.normals(kind));
         let vessels = self.growth.vessels(kind);
@@ -222,7 +222,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Grows to the end, checking every step, and counts the nodes.
+/// Grows to the end, checks every step, and counts the nodes.
 fn grow(case: &Case, settings: &ColonizationSettings, seed: u64) -> usize {
     let mut run = Run::new(case, settings.clone(), seed);
     while !run.growth.is_finished() {

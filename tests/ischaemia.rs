@@ -19,7 +19,7 @@ fn network(tree: &VesselTree, settings: FlowSettings) -> Network {
     Network::new(tree, settings).expect("valid settings")
 }
 
-/// Supply after a gap was laid over one segment.
+/// Supply after laying a gap over one segment.
 fn supply(tree: &VesselTree, settings: FlowSettings, node: u32, gap: Interruption) -> Supply {
     let mut network = network(tree, settings);
     let mut supply = Supply::new(tree, &network).expect("flow that converges");
@@ -50,7 +50,7 @@ fn what_lies_behind_a_clamp_has_none_and_the_stem_a_half() {
         let s = supply.segments();
         assert_eq!((s[2], s[3]), (0.0, 0.0), "{s:?}");
         assert_eq!(supply.ischaemic_share(&tree, 0.5), 0.5);
-        // The other branch takes what the stem has to spare, which counts as no more than all.
+        // The other branch takes the stem's spare flow, and its supply is capped at 1.
         assert!((s[4] - 1.0).abs() < 1e-6 && (s[5] - 1.0).abs() < 1e-6, "{s:?}");
         assert!((s[1] - 0.5).abs() < 0.01, "{s:?}");
     }

@@ -1,4 +1,4 @@
-//! Procedural organs are what their documentation says: closed, oriented, human-sized, repeatable, different by seed.
+//! Procedural organs match their documentation: closed, oriented, human-sized, repeatable, different by seed.
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
@@ -25,7 +25,7 @@ fn weld(mesh: &ShadedMesh) -> Vec<usize> {
         .collect()
 }
 
-/// Checks that every edge is shared by two triangles running along it in opposite directions, and gives V − E + F.
+/// Checks that two triangles share every edge, in opposite directions, and returns V − E + F.
 fn assert_closed(mesh: &ShadedMesh, name: &str) -> isize {
     let welded = weld(mesh);
     let mut edges: BTreeMap<(usize, usize), (u32, u32)> = BTreeMap::new();
@@ -124,7 +124,7 @@ fn a_seed_is_one_colon_to_the_bit_and_another_seed_another() {
     assert_ne!(liver(3).mesh.positions, liver(4).mesh.positions);
 }
 
-/// For a point of the wall, the index of the limb that it is nearest to, by the tube's surface, and its distance from the
+/// For a point of the wall, the index of the nearest limb, by the tube's surface, and the point's distance from the
 /// centre line there.
 fn nearest(colon: &Colon, point: Vec3) -> (usize, f32) {
     let distances = colon.centre_line.iter().map(|at| at.distance(point));
@@ -151,7 +151,7 @@ fn the_wall_does_not_cut_itself() {
             let fill = curvature * colon.radii[i];
             assert!(fill < 0.95, "colon {seed}: at point {i} the tube fills {fill} of its bend");
         }
-        // Neighbouring rings lie near one another along the line; a vertex of another limb must be further than the wall.
+        // Neighbouring rings are close along the line; a vertex of another limb must be farther than the wall.
         let row = colon.mesh.positions.len() / 400;
         let part = colon.mesh.part(colon.outer.clone());
         for point in part.positions.iter().step_by(row.max(7)) {
@@ -179,7 +179,7 @@ fn the_wall_keeps_its_thickness_and_the_lumen_is_open() {
         let [outer, inner] = [&colon.outer, &colon.inner].map(|range| colon.mesh.part(range.clone()));
         assert!(outer.positions.len() + inner.positions.len() < colon.mesh.positions.len(), "the rim is neither");
         let last = colon.centre_line.len() - 1;
-        // The inner side's vertices leave room about the centre line from the cut end on to the caecum.
+        // The inner side's vertices leave room around the centre line from the cut end to the caecum.
         for point in inner.positions.iter().step_by(3) {
             let (index, distance) = nearest(&colon, *point);
             let blind_end = index * 6 < last;

@@ -1,6 +1,6 @@
-//! Vessels supply real organs as wholes: no part of the defaults' or an organ preset's organ stays without.
+//! Vessels supply real organs as a whole: with the defaults or an organ preset, no part is left without vessels.
 //!
-//! The organs lie beside the checkout, as `CONTRIBUTING.md` says; without them these tests skip.
+//! The organs are stored beside the checkout, as `CONTRIBUTING.md` says; without them these tests are skipped.
 
 #![cfg(all(feature = "mesh_files", feature = "serialize"))]
 
@@ -18,7 +18,7 @@ use std::{path::Path, sync::Arc};
 const ORGANS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs");
 const SEEDS: u64 = 3;
 const SAMPLES: usize = 20_000;
-/// Of an octant with fewer samples than this little is known.
+/// Octants with fewer samples are ignored.
 const LEAST_SAMPLES: usize = 100;
 
 /// Samples of the tissue, by the octant of its box in which they lie.
@@ -102,13 +102,13 @@ fn the_defaults_supply_every_surface() {
     let compact = ["bladder_vhf", "eyeball_mh", "heart_vhf", "kidney_left_vhf", "liver_vhf", "spleen_vhf_uv"];
     check(&compact, PresetName::Paper, TissueMode::Surface, [0.9, 0.8]);
     check(&["colon_vhf", "colon_vhm"], PresetName::Paper, TissueMode::Surface, [0.9, 0.8]);
-    // Not the small intestine: the paper's lengths, fitted to all of its surface, are longer than its loops are wide.
+    // Not the small intestine: the paper's lengths, fitted to its whole surface, exceed the width of its loops.
 }
 
 #[test]
 fn the_defaults_supply_every_volume() {
     let solid = ["bladder_vhf", "eyeball_mh", "kidney_left_vhf", "liver_vhf", "spleen_vhf_uv"];
     check(&solid, PresetName::Paper, TissueMode::Volume, [0.7, 0.6]);
-    // Their arms are narrower than the lengths that are fitted to the whole.
+    // Parts of these are narrower than the lengths, which are fitted to the whole.
     check(&["heart_vhf", "colon_vhf", "colon_vhm"], PresetName::Paper, TissueMode::Volume, [0.4, 0.35]);
 }

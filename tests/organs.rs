@@ -1,6 +1,6 @@
-//! Vessels grow on and in real organs, the awkward files too.
+//! Vessels grow on and in real organs, including awkward files.
 //!
-//! The organs lie beside the checkout, as `CONTRIBUTING.md` says; without them these tests skip.
+//! The organs are stored beside the checkout, as `CONTRIBUTING.md` says; without them these tests are skipped.
 
 #![cfg(feature = "mesh_files")]
 
@@ -20,7 +20,7 @@ use std::{
 
 const ORGANS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs");
 
-/// Awkward files whose surface is open, so that nobody can say what is inside.
+/// Awkward files with an open surface, whose inside is not defined.
 const OPEN: [&str; 2] = ["colon_vhf_original", "pancreas_vhf_v2_original"];
 
 /// All organs in a folder, by name.
@@ -47,7 +47,7 @@ fn organs() -> impl Iterator<Item = (String, TriangleMesh)> {
     })
 }
 
-/// Grows a few steps with default settings, fitted to the organ, and checks what holds of any growth.
+/// Grows a few steps with default settings, fitted to the organ, and checks invariants of any growth.
 fn grow(name: &str, tissue: Arc<dyn Tissue>, steps: u32, samples: u32) -> Colonization {
     let settings = ColonizationSettings { steps, samples, ..ColonizationSettings::default() }.fit(tissue.extent());
     let mut growth =
@@ -103,9 +103,9 @@ fn vessels_grow_on_the_surface_of_every_organ() {
     }
 }
 
-/// How often the surface winds around each point, as a ray from it counts.
+/// Winding number of the surface around each point, counted along a ray.
 ///
-/// The ray's direction has nothing to do with any axis of the mesh, so that it meets no edge.
+/// The ray's direction differs from all axes of the mesh, so that it hits no edge.
 fn windings(mesh: &TriangleMesh, points: &[Vec3]) -> Vec<i32> {
     let turn = Mat3::from_rotation_x(0.713_248) * Mat3::from_rotation_y(1.137_519);
     let turned = |point: Vec3| turn.as_dmat3() * point.as_dvec3();

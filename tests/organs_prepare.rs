@@ -1,4 +1,4 @@
-//! Every real organ of the shared data prepares as surface and as volume. Skipped where the data is absent.
+//! Every real organ of the shared data can be prepared as surface and as volume. Skipped without the data.
 
 #![cfg(feature = "mesh_files")]
 
@@ -16,7 +16,7 @@ use std::{
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
-/// Organs that are watertight as they come.
+/// Organs that are watertight in their files.
 const WATERTIGHT: [&str; 11] = [
     "bladder_vhf",
     "colon_vhf",
@@ -31,7 +31,7 @@ const WATERTIGHT: [&str; 11] = [
     "spleen_vhf_uv",
 ];
 
-/// Organs with open edges, inner walls and parts that close only together.
+/// Organs with open edges, inner walls and parts that are closed only together.
 const AWKWARD: [&str; 3] =
     ["awkward/colon_vhf_original", "awkward/pancreas_vhf_v2_original", "awkward/spleen_vhf_original_uv"];
 
@@ -48,7 +48,7 @@ fn read(folder: &Path, name: &str) -> Result<TriangleMesh, Box<dyn std::error::E
     Ok(read_glb(&folder.join(name).with_extension("glb"))?)
 }
 
-/// The shortest of several runs, in ms, and what the last one gave.
+/// The shortest time of several runs, in ms, and the last result.
 fn least_ms<T>(mut work: impl FnMut() -> T) -> (f64, T) {
     let mut run = || {
         let start = Instant::now();
@@ -61,7 +61,7 @@ fn least_ms<T>(mut work: impl FnMut() -> T) -> (f64, T) {
     })
 }
 
-/// How often a mesh winds around a point, by the solid angles of its triangles (van Oosterom & Strackee 1983).
+/// Winding number of a mesh around a point, by the solid angles of its triangles (van Oosterom & Strackee 1983).
 fn winding(mesh: &TriangleMesh, point: Vec3) -> f64 {
     let solid_angle = |triangle| {
         let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3() - point.as_dvec3());
@@ -126,7 +126,7 @@ fn points_outside_are_brought_in() -> Outcome {
 #[test]
 fn awkward_organs_are_usable() -> Outcome {
     let Some(folder) = folder() else { return Ok(()) };
-    // The colon is a wall of its own thickness; pancreas and spleen are as solid as their parts together.
+    // The colon is only a wall; pancreas and spleen are solid as the union of their parts.
     for (name, least, most) in [(AWKWARD[0], 3e-4, 6e-4), (AWKWARD[1], 8.2e-5, 8.6e-5), (AWKWARD[2], 1.89e-4, 1.93e-4)]
     {
         let mesh = read(&folder, name)?;
@@ -149,7 +149,7 @@ fn awkward_organs_are_usable() -> Outcome {
 fn the_colon_is_prepared_in_time() -> Outcome {
     let Some(folder) = folder() else { return Ok(()) };
     let mesh = read(&folder, "colon_vhf")?;
-    // The limits are those of an optimised build on a machine that does nothing else.
+    // The limits are for an optimised build on an idle machine.
     let slack = if cfg!(debug_assertions) { 10.0 } else { 2.0 };
     let (surface_ms, surface) = least_ms(|| MeshSurface::new(mesh.clone()));
     surface?;

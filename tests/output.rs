@@ -1,4 +1,4 @@
-//! Files: whole or not at all, readable by other programs, read back to the same bits.
+//! Files: written whole or not at all, readable by other programs, and read back bit for bit.
 
 use bevy_math::{Vec3, vec3};
 use bevy_vessels::synthesis::io::{
@@ -12,7 +12,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// A folder of a test's own, removed at its end.
+/// A temporary folder of a test, removed at its end.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -41,7 +41,7 @@ impl Drop for Folder {
     }
 }
 
-/// A forest with coordinates of every size that f32 has.
+/// A forest with coordinates of all f32 magnitudes.
 fn random(seed: u64, size: usize) -> VesselTree {
     let mut rng = Stream::Statistics.rng(seed);
     let mut number = || loop {
@@ -212,7 +212,7 @@ fn least_radius_lifts_what_is_too_thin() {
     }
 }
 
-/// Nodes, roots, leaves and total length of the vessels that are shared for tests, and `N_k` where they are trees.
+/// Nodes, roots, leaves and total length of the shared test vessels, and `N_k` if they are trees.
 #[test]
 fn real_vessels_come_back_and_have_the_published_statistics() {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/vessels"));
@@ -276,7 +276,7 @@ fn csv_has_one_line_per_segment_and_one_value_per_column() {
     assert_eq!(String::from_utf8(empty).expect("text").lines().count(), 1, "the header alone");
 }
 
-/// Triangles of an OBJ file by group, as another reader sees them.
+/// Triangles of an OBJ file by group, read by another program.
 fn parse_obj(bytes: &[u8]) -> Vec<tobj::Model> {
     let options = tobj::LoadOptions { single_index: true, ..Default::default() };
     let mut reader = io::BufReader::new(bytes);
@@ -308,7 +308,7 @@ fn obj_segments_are_closed_outward_round_cones() {
             let segments = tree.segments().count() as u32;
             assert_eq!(positions.len() as u32, per_segment * segments);
             assert_eq!(triangles.len() as u32, (2 * per_segment - 4) * segments, "V − E + F = 2 for each");
-            // Closed and oriented: every directed edge once, its opposite too.
+            // Closed and oriented: every directed edge once, and its opposite, too.
             let mut edges: Vec<(u32, u32)> = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();
             edges.sort_unstable();
             assert!(edges.windows(2).all(|pair| pair[0] != pair[1]));
@@ -414,7 +414,7 @@ fn a_failing_writer_leaves_the_old_file() {
     let folder = Folder::new("failing");
     let path = folder.join("tree.swc");
     fs::write(&path, "old").expect("a file");
-    // More than any buffer, so that some of it has reached the disk when the writer fails.
+    // More than any buffer, so that some data is on the disk when the writer fails.
     let fail = |out: &mut dyn Write| {
         out.write_all(&vec![b'x'; 1 << 20])?;
         Err(io::Error::other("out of ink"))
@@ -467,7 +467,7 @@ fn many_writers_of_one_file_leave_one_whole_content() {
     assert_eq!(folder.names(), ["tree.csv"]);
 }
 
-/// Set for the process that is to die while it writes.
+/// Set for the process that must die while it writes.
 const VICTIM: &str = "BEVY_VESSELS_TEST_DIE_WRITING";
 
 #[test]

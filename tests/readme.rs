@@ -1,4 +1,4 @@
-//! The README says what is so: its code, its defaults, its links and its presets.
+//! The README is true: its code, its defaults, its links and its presets.
 
 use bevy_vessels::synthesis::{
     colonization::{ColonizationSettings, SystemSettings},
@@ -11,12 +11,12 @@ fn read(path: &str) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The default that the settings table gives, as it is written.
+/// The default in the settings table, as text.
 fn default_in_table(readme: &str, setting: &str) -> String {
     let row = format!("| `{setting}`");
     let row = readme.lines().find(|line| line.starts_with(&row)).unwrap_or_else(|| panic!("no row for {setting}"));
     let cells: Vec<&str> = row.split('|').map(str::trim).collect();
-    // Rows of one system have limits before the default, rows of both have not.
+    // Rows of one system have limits before the default, rows of both don't.
     cells[if cells.len() > 5 { 4 } else { 3 }].trim_end_matches('°').to_owned()
 }
 
@@ -25,7 +25,7 @@ fn the_table_of_settings_has_the_defaults() {
     let readme = read("README.md");
     let ColonizationSettings { steps, samples, idle_steps, confine, stand_off, arterial, venous } =
         ColonizationSettings::default();
-    // Taken apart, so that a setting cannot be forgotten here.
+    // Destructured, so that no setting can be forgotten here.
     let SystemSettings {
         direction_weight,
         drain_birth_distance,
@@ -129,10 +129,10 @@ fn every_file_is_in_the_lines_of_its_own_room() {
     }
 }
 
-/// The rooms of a listing by their paths, each with the words of its own lines. Lines that begin no room go on with the
-/// last one.
+/// The rooms of a listing by their paths, each with the words of its lines. Lines that begin no room continue the last
+/// one.
 fn words_of_rooms(listing: &str) -> Vec<(Vec<String>, Vec<String>)> {
-    /// Columns in which a room may begin; what lies further in goes on with a room.
+    /// Columns in which a room may begin; text further in continues a room.
     const DEEPEST: usize = 4;
     let mut open: Vec<(usize, String)> = Vec::new();
     let mut rooms: Vec<(Vec<String>, Vec<String>)> = Vec::new();

@@ -1,4 +1,4 @@
-//! Growth against what the paper's own program measured, and against what the paper says its settings do.
+//! Growth compared with measurements of the paper's own program, and with the paper's statements about its settings.
 //!
 //! The figures are means over 5 seeds of the authors' published program (Rauch & Harders 2021) on its disc of radius 0.5
 //! and in its ball, with the venous influence distance 1.5 times the arterial one.
@@ -17,10 +17,10 @@ use bevy_vessels::synthesis::{
 use std::sync::Arc;
 
 const SEEDS: u64 = 5;
-/// Seeds of the finer disc. Now and then its veins stall, as do those of the paper's program: five seeds say little.
+/// Seeds of the finer disc. Its veins sometimes stall, as do those of the paper's program, so five seeds are too few.
 const FINE_DISC_SEEDS: u64 = 40;
 
-/// Means over seeds of what the reference measures.
+/// Means over seeds of the reference's measures.
 #[derive(Debug, Default)]
 struct Measures {
     nodes: f64,

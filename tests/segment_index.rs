@@ -1,4 +1,4 @@
-//! The index over segments against brute force: what a box meets, what is nearest, what a ray hits first.
+//! The index over segments against brute force: segments in a box, the nearest one, and the first hit of a ray.
 
 use bevy_math::{DVec3, Vec3};
 use bevy_vessels::synthesis::{
@@ -9,10 +9,10 @@ use bevy_vessels::synthesis::{
 };
 use rand::RngExt;
 
-/// Shapes of trees that have gone wrong in indices.
+/// Shapes of trees that are hard for indices.
 #[derive(Clone, Copy, Debug)]
 enum Shape {
-    /// Steps of about one length, as growth makes them, in a forest of three.
+    /// Steps of about equal length, as in growth, in a forest of three trees.
     Grown,
     /// The same in the plane z = 0.
     Flat,
@@ -62,14 +62,14 @@ fn tree(shape: Shape, nodes: usize, seed: u64) -> VesselTree {
     VesselTree::from_arrays(positions, parents, radii).expect("a tree")
 }
 
-/// The first nodes of a tree.
+/// A tree of the first nodes.
 fn beginning(tree: &VesselTree, nodes: usize) -> VesselTree {
     let (positions, parents, radii) = (tree.positions(), tree.parents(), tree.radii());
     VesselTree::from_arrays(positions[..nodes].to_vec(), parents[..nodes].to_vec(), radii[..nodes].to_vec())
         .expect("a tree")
 }
 
-/// The tree bent about the y axis, twisted, and with other radii.
+/// The tree bent about the y axis, twisted, and with changed radii.
 fn bent(tree: &VesselTree) -> VesselTree {
     let bend = |p: &Vec3| Vec3::new(p.x + 0.4 * p.y * p.y, p.y - 0.3 * p.x * p.z, 0.6 * p.z + 0.2 * p.x);
     let radii = tree.radii().iter().enumerate().map(|(i, r)| r * (0.5 + (i % 7) as f32 * 0.2)).collect();
@@ -83,7 +83,7 @@ fn ends(tree: &VesselTree, node: usize, parent: usize) -> [(DVec3, f64); 2] {
     [(tree.positions()[parent].as_dvec3(), start.into()), (tree.positions()[node].as_dvec3(), radius.into())]
 }
 
-/// Nodes whose segment, with its radius, has a box that meets another, and may have one, by a margin.
+/// Nodes whose segment's box, radius included and widened by a margin, meets another box.
 fn boxes_that_meet(tree: &VesselTree, min: Vec3, max: Vec3, margin: f64) -> Vec<NodeId> {
     let meets = |&(node, parent): &(usize, usize)| {
         let [(a, _), (b, radius)] = ends(tree, node, parent);
@@ -114,7 +114,7 @@ fn check_boxes(tree: &VesselTree, index: &SegmentIndex, rng: &mut VesselRng, wha
     }
 }
 
-/// Distance of the nearest segment, by a formula of its own: least of a quadratic over the share.
+/// Distance of the nearest segment, by an independent formula: the minimum of a quadratic over the share.
 fn brute_nearest(tree: &VesselTree, point: Vec3) -> Option<f64> {
     let distance = |(node, parent)| {
         let [(a, _), (b, _)] = ends(tree, node, parent);
@@ -140,7 +140,7 @@ fn check_nearest(tree: &VesselTree, index: &SegmentIndex, rng: &mut VesselRng, w
     }
 }
 
-/// How far along a ray a ball begins.
+/// Distance along a ray to a ball.
 fn ball_entry(from: DVec3, direction: DVec3, center: DVec3, radius: f64) -> f64 {
     let to_center = center - from;
     if to_center.length() <= radius {
@@ -151,7 +151,7 @@ fn ball_entry(from: DVec3, direction: DVec3, center: DVec3, radius: f64) -> f64 
     if closest < 0.0 || aside > radius * radius { f64::INFINITY } else { closest - (radius * radius - aside).sqrt() }
 }
 
-/// Where a ray meets the first of many balls along every segment.
+/// Distance along a ray to the first of many balls along every segment.
 fn brute_hit(tree: &VesselTree, from: DVec3, direction: DVec3) -> f64 {
     let mut first = f64::INFINITY;
     for (node, parent) in tree.segments() {
@@ -169,7 +169,7 @@ fn check_hits(tree: &VesselTree, index: &SegmentIndex, rng: &mut VesselRng, what
     let mut hits = 0;
     for number in 0..60 {
         let from = 2.0 * any_point(rng);
-        // Some rays along the axes, where a slab has no thickness in time.
+        // Some rays along the axes, which are parallel to slabs.
         let at_vessel = tree.positions()[rng.random_range(0..tree.len())] - from + 0.01 * any_point(rng);
         let direction = if number % 4 == 0 { Vec3::AXES[number / 4 % 3] } else { at_vessel };
         let unit = direction.as_dvec3().normalize();
@@ -179,7 +179,7 @@ fn check_hits(tree: &VesselTree, index: &SegmentIndex, rng: &mut VesselRng, what
             continue;
         };
         hits += 1;
-        // Balls between the samples are met a little earlier, or alone.
+        // Balls between the samples may be hit a little earlier, or be the only ones hit.
         assert!(f64::from(distance) <= expected * (1.0 + 1e-6), "{what}: {distance}, and not {expected}");
         let point = from.as_dvec3() + f64::from(distance) * unit;
         let [(a, start), (b, end)] = ends(tree, place.node.index(), tree.parents()[place.node.index()] as usize);
@@ -275,7 +275,7 @@ fn a_partial_refit_equals_a_whole_one() {
 
 #[test]
 fn nearest_takes_the_lower_of_equally_near_segments() {
-    // Four segments from one root, and one of them twice: a point above the root is equally far from all.
+    // Four segments from one root, one of them twice: a point above the root is equally far from all.
     let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y, Vec3::X];
     let parents = vec![NO_PARENT, 0, 0, 0, 0, 0];
     let tree = VesselTree::from_arrays(positions, parents, vec![0.1; 6]).unwrap();
@@ -291,7 +291,7 @@ fn nearest_takes_the_lower_of_equally_near_segments() {
 
 #[test]
 fn a_ray_meets_a_ball_that_holds_its_whole_segment() {
-    // The end's radius exceeds the length, so that the start's ball lies within.
+    // The end's radius exceeds the length, so that the end's ball contains the start's.
     let tree = VesselTree::from_arrays(vec![Vec3::ZERO, Vec3::X * 0.1], vec![NO_PARENT, 0], vec![0.2, 1.0]).unwrap();
     let index = SegmentIndex::new(&tree);
     let hit = index.first_hit(&tree, Vec3::X * -5.0, Vec3::X, 10.0);

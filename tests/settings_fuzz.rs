@@ -1,4 +1,4 @@
-//! A thousand random settings, within their limits and beyond: growth starts or says what is wrong, and always ends.
+//! A thousand random settings, within and beyond their limits: growth starts or reports what is wrong, and always ends.
 
 mod common;
 
@@ -20,10 +20,10 @@ use std::{
 const SETTINGS: u64 = 1000;
 const MOST_STEPS: u32 = 40;
 const MOST_SAMPLES: u32 = 800;
-/// Far more than the slowest growth takes, on any machine.
+/// Far longer than the slowest growth on any machine.
 const HANGS_AFTER: Duration = Duration::from_secs(120);
 
-/// Lengths within their limits: all of about one size, as a user's are, or each of any size, at times absurd.
+/// Lengths within their limits: all of similar size, as a user's are, or each of any size, sometimes absurd.
 #[derive(Clone, Copy)]
 enum Lengths {
     About(f32),
@@ -49,7 +49,7 @@ impl Lengths {
     }
 }
 
-/// A number from a range, at times one of its ends.
+/// A number from a range, sometimes one of its ends.
 fn number(rng: &mut VesselRng, low: f32, high: f32) -> f32 {
     match rng.random_range(0..10) {
         0 => low,
@@ -101,7 +101,7 @@ fn within_limits(rng: &mut VesselRng) -> ColonizationSettings {
     }
 }
 
-/// A field, how it is set, and values beyond its limits.
+/// A field, its setter, and values beyond its limits.
 type Break = (&'static str, fn(&mut SystemSettings, f32), &'static [f32]);
 
 const NOT_A_LENGTH: &[f32] = &[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1e-6, -1e30];
@@ -124,7 +124,7 @@ const BREAKS: &[Break] = &[
     ("tissue_growth", |system, value| system.tissue_growth = TissueGrowth::Exponential(value), &[f32::NAN, -1.0, 1e38]),
 ];
 
-/// Puts one value beyond its limits. What the error must name comes back.
+/// Sets one value beyond its limits. Returns the name that the error must contain.
 fn break_one(settings: &mut ColonizationSettings, rng: &mut VesselRng) -> &'static str {
     match rng.random_range(0..BREAKS.len() + 2) {
         index if index < BREAKS.len() => {
@@ -145,7 +145,7 @@ fn break_one(settings: &mut ColonizationSettings, rng: &mut VesselRng) -> &'stat
     }
 }
 
-/// Grows with the settings of a seed: nodes grown, or `None` where the settings were rightly turned down.
+/// Grows with the settings of a seed. Returns the number of nodes, or `None` if the settings were rightly rejected.
 fn grow(cases: &[Case], seed: u64) -> Option<usize> {
     let mut rng = Stream::Statistics.rng(seed);
     let case = &cases[rng.random_range(0..cases.len())];
@@ -164,7 +164,7 @@ fn grow(cases: &[Case], seed: u64) -> Option<usize> {
     let step = settings.arterial.step_length.min(settings.venous.step_length);
     let mut growth = match Colonization::new(case.tissue.clone(), settings, &case.roots, seed) {
         Ok(growth) => growth,
-        // Two roots a ten-thousandth of a step apart are one. All tissues here are of about size 1.
+        // Two roots a ten-thousandth of a step apart coincide. All tissues here have about size 1.
         Err(ColonizationError::Roots(RootError::Coincide { .. })) if step > 100.0 => return None,
         Err(error) => panic!("growth does not start: {error}"),
     };

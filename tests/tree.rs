@@ -1,4 +1,4 @@
-//! Sweeps, validation, statistics and hash of trees, against shapes whose numbers are known and brute-force twins.
+//! Sweeps, validation, statistics and hash of trees, against shapes with known numbers and brute force.
 
 use bevy_math::{Vec3, vec3};
 use bevy_vessels::synthesis::random::Stream;
@@ -58,7 +58,7 @@ fn caterpillar(n: u32) -> VesselTree {
     tree(positions, parents, radii)
 }
 
-/// A random forest: some nodes are roots, the others hang on any node before them, mostly on a late one.
+/// A random forest: some nodes are roots, the others have any earlier node as parent, mostly a late one.
 fn random(seed: u64, size: usize) -> VesselTree {
     let mut rng = Stream::Statistics.rng(seed);
     let mut parents = Vec::new();
@@ -85,7 +85,7 @@ fn brute_strahler(tree: &VesselTree, node: usize) -> u32 {
     }
 }
 
-/// Splits below the root, segments, length and root above a node, by walking up.
+/// Splits below the root, segments, length and root above a node, by walking upwards.
 fn brute_way(tree: &VesselTree, node: usize) -> (u32, u32, f64, u32) {
     let (mut level, mut depth, mut length, mut at) = (0, 0, 0.0, node);
     while tree.parents()[at] != NO_PARENT {
@@ -223,7 +223,7 @@ fn a_caterpillar_has_two_orders_however_long() {
     assert_eq!(statistics.strahler[0].streams, 400);
     assert_eq!(statistics.strahler[1].streams, 1);
     near(statistics.branching_ratio.expect("two orders"), 400.0, 1e-2);
-    // The last spine node has one side vessel only, so that vessel starts where order 2 ends, one segment early.
+    // The last spine node has only one side vessel, which starts where order 2 ends, one segment early.
     near(statistics.strahler[1].mean_length, 399.0, 1e-9);
     near(statistics.strahler[0].mean_length, (399.0 + 2.0) / 400.0, 1e-9);
     assert_eq!(statistics.diameters_by_level.len(), 400);

@@ -10,7 +10,7 @@ use bevy_vessels::synthesis::{
     tissue::{MeshTissue, TissueMode},
 };
 
-/// An organ of a unit's size, larger by a factor.
+/// An organ of unit size, scaled by a factor.
 fn grown(mesh: &TriangleMesh, factor: f32, mode: TissueMode, seed: u64) -> Colonization {
     let positions = mesh.positions().iter().map(|&position| position * factor).collect();
     let mesh = TriangleMesh::new(positions, mesh.triangles().to_vec(), None).expect("a mesh");
@@ -34,10 +34,10 @@ fn metres_millimetres_and_units_grow_the_same_vessels() {
                     let (a, b) = (toy.tree(kind), organ.tree(kind));
                     let case = format!("{mode:?}, seed {seed}, {}, times {factor}", kind.name());
                     if exact {
-                        // Powers of two round as the toy does, so nothing at all may differ.
+                        // Powers of two have the toy's rounding, so nothing may differ.
                         assert_eq!(a.parents(), b.parents(), "{case}");
                     }
-                    // Others differ by rounding, which changes which way single vessels go.
+                    // Others differ by rounding, which changes the paths of single vessels.
                     let ratio = b.len() as f32 / a.len() as f32;
                     assert!((ratio - 1.0).abs() < 0.08, "{case}: {} nodes, {} in the toy", b.len(), a.len());
                 }

@@ -1,12 +1,13 @@
-//! Drops: a small particle emitter on the CPU, which reads what each open end loses.
+//! Drops: a small particle emitter on the CPU, which reads the loss of each open end.
 //!
-//! A drop is an entity; all share one mesh and one material, so that they are drawn as instances. They leave an end as
-//! fast as its blood does, drawn out along their way: arteries spurt with the pulse in jets that break up, and where
-//! blood is slow it wells up from the wound. Where it lands it joins the [`Film`]. No blood is invented, and only what
-//! falls past the organ is dropped: when drops are scarce they are larger.
+//! A drop is an entity; all share one mesh and one material, so that they are drawn as instances. They leave an end
+//! with the velocity of its blood, stretched along their path: arteries spurt with the pulse in jets that break up, and
+//! slow blood wells up from the wound. A drop that lands joins the [`Film`]. No blood is added, and only drops that
+//! miss the organ are lost: if drops are scarce, they are larger.
 //!
-//! Particles on the GPU take the same hook: for each [`OpenEnd`] entity the rate is `flow`, the speed `velocity`, and place
-//! and direction are those of its `GlobalTransform`. Write these into the effect's spawner and properties once a frame.
+//! Particles on the GPU can use the same data: for each [`OpenEnd`] entity the rate is `flow`, the speed `velocity`,
+//! and position and direction are those of its `GlobalTransform`. Write these into the effect's spawner and properties
+//! once a frame.
 
 use super::{
     film::{Film, show_film},
@@ -18,22 +19,22 @@ use bevy_vessels::{
     synthesis::units::Volume,
 };
 
-/// Radius of a drop as a share of the vessel's, and the limits of it, in metres.
+/// Radius of a drop as a share of the vessel's, and its limits in metres.
 const DROP_SHARE: f32 = 0.8;
 const SMALLEST: f32 = 0.000_2;
 const LARGEST: f32 = 0.000_4;
 /// Most drops in the air.
 const MOST_DROPS: usize = 5000;
-/// Slowest blood that leaves in a jet, in m/s.
+/// Least speed of a jet, in m/s.
 const JET: f64 = 0.35;
-/// Where drops end that miss the organ. World units.
+/// Height at which drops that miss the organ end, in world units.
 const FLOOR: f32 = -0.75;
 /// Seconds in which a drop clears the rim of its own wound.
 const CLEAR: f32 = 0.02;
-/// Seconds in which a jet breaks up into drops, and how far apart they may be that hang together until then, in metres.
+/// Seconds in which a jet breaks up into drops, and the largest distance between connected drops until then, in metres.
 const BREAKS_UP: f32 = 0.05;
 const APART: f32 = 0.005;
-/// Seconds over which the eye, or a camera, sees a drop: fast ones are streaks.
+/// Exposure of the eye or a camera, in seconds: fast drops are streaks.
 const EXPOSURE: f32 = 0.001;
 
 /// Open ends drip, drops fall, blood runs over the organ.
@@ -51,34 +52,34 @@ impl Plugin for BloodPlugin {
 struct Drop {
     velocity: Vec3,
     volume: Volume,
-    /// Of the ball that it is in the end, in world units.
+    /// Radius of the final ball, in world units.
     radius: f32,
-    /// Half of the way to the next drop of the jet, in world units.
+    /// Half of the distance to the next drop of the jet, in world units.
     drawn_out: f32,
     age: f32,
 }
 
-/// What an end has lost that is no drop yet, and how many drops there were.
+/// Loss of an end that is not a drop yet, and the number of its drops.
 #[derive(Component, Default)]
 struct Dripping {
     lost: Volume,
     drops: u32,
 }
 
-/// What drops are made of.
+/// The mesh and material of drops.
 #[derive(Clone)]
 struct Look {
     mesh: Handle<Mesh>,
     material: Handle<StandardMaterial>,
 }
 
-/// Metres of a world unit: drops are as fast and as large beside the organ as they would be.
+/// Metres of a world unit, so that drops have true speed and size relative to the organ.
 fn metres(organs: &Query<(&Perfusion, &Transform)>) -> f32 {
     let unit = |(organ, place): (&Perfusion, &Transform)| organ.scale.metres() as f32 / place.scale.max_element();
     organs.iter().next().map_or(1.0, unit)
 }
 
-/// Volume of a ball of a radius in metres, and the radius of one of a volume.
+/// Volume of a ball with a radius in metres.
 fn ball(radius: f32) -> Volume {
     Volume::from_cubic_metres(f64::from(radius * radius * radius * 4.188_79))
 }
@@ -94,12 +95,12 @@ fn scattered(index: u32, salt: u32) -> f32 {
     (mixed ^ (mixed >> 13)) as f32 / u32::MAX as f32
 }
 
-/// An organ that has come has no blood on it.
+/// Gives a new organ a film without blood.
 fn lay_film(mut commands: Commands, organs: Query<(&Perfusion, &Transform)>, surface: Res<Surface>) {
     commands.insert_resource(Film::new(&surface, metres(&organs)));
 }
 
-/// Open ends let drops go, as many as they lose; slow blood wells up beside them.
+/// Emits drops at open ends, by their loss; slow blood wells up beside them.
 fn bleed(
     mut commands: Commands,
     time: Res<Time>,
@@ -144,7 +145,7 @@ fn bleed(
             dripping.drops += 1;
             dripping.lost = Volume::from_ml(dripping.lost.ml() + volume.ml());
             let velocity = leave(end, place, normal, dripping.drops) / unit;
-            // They leave one after the other, all through the frame.
+            // They leave one after the other, throughout the frame.
             let interval = time.delta_secs() / count as f32;
             let age = interval * (number as f32 + scattered(dripping.drops, 7));
             let drawn_out = 0.5 * (velocity.length() * interval).min(APART / unit);
@@ -156,8 +157,8 @@ fn bleed(
     }
 }
 
-/// How a drop leaves an end, in metres a second: out of the lumen, and up, away from the tissue beneath. A jet wavers, and
-/// its drops stray a little.
+/// Velocity of a drop at an end, in metres a second: out of the lumen, and up, away from the tissue below. A jet
+/// wavers, and its drops scatter a little.
 fn leave(end: &OpenEnd, place: &GlobalTransform, up: Vec3, drop: u32) -> Vec3 {
     let stray = Vec3::from_array([1, 2, 3].map(|salt| scattered(drop, salt) - 0.5));
     let waver =
@@ -167,7 +168,7 @@ fn leave(end: &OpenEnd, place: &GlobalTransform, up: Vec3, drop: u32) -> Vec3 {
 }
 
 impl Drop {
-    /// Drawn out along its way, by its speed and as long as the jet hangs together, and as thin as its volume then allows.
+    /// Stretched along its path, by its speed and while the jet is connected, and thinned to keep its volume.
     fn pose(&self, at: Vec3) -> Transform {
         let jet = self.drawn_out * ops::exp(-self.age * self.age / (BREAKS_UP * BREAKS_UP));
         let half = self.radius + jet.max(0.5 * EXPOSURE * self.velocity.length());
@@ -179,7 +180,7 @@ impl Drop {
     }
 }
 
-/// Drops fall, and join the film where they land.
+/// Lets drops fall, and join the film where they land.
 fn fall(
     mut commands: Commands,
     time: Res<Time>,
@@ -208,7 +209,7 @@ fn fall(
     }
 }
 
-/// The film flows, and drips from where it hangs.
+/// Lets the film flow, and drip where it hangs.
 fn run(
     mut commands: Commands,
     time: Res<Time>,

@@ -1,6 +1,7 @@
-//! An organ that breathes, and pales where it lacks blood: positions and colours of its vertices, written each frame.
+//! An organ that breathes, and pales where it lacks blood. Positions and colours of its vertices are written each
+//! frame.
 //!
-//! It stands for a soft body: whoever moves vertices in the mesh asset has the vessels follow, by
+//! It stands for a soft body: vessels follow the moved vertices of the mesh asset, by
 //! [`FollowsMesh`](bevy_vessels::plugin::FollowsMesh).
 
 use crate::{common::controls::Organ, surface::Surface};
@@ -14,12 +15,12 @@ use bevy_vessels::{
 };
 use std::f32::consts::TAU;
 
-/// How long a breath takes.
+/// Duration of a breath.
 const SECONDS: f32 = 4.0;
-/// Colour that tissue without blood is multiplied by. Linear sRGB: less red than flesh, and greyer.
+/// Factor for the colour of tissue without blood. Linear sRGB: less red than flesh, and greyer.
 const PALE: [f32; 3] = [0.92, 1.25, 1.3];
 
-/// Organs breathe once their vessels have grown.
+/// Lets organs breathe once their vessels have grown.
 pub struct BreathingPlugin;
 
 impl Plugin for BreathingPlugin {
@@ -81,7 +82,7 @@ fn breathe(
     }
 }
 
-/// Colours organs by what their tissue gets.
+/// Colours organs by the supply of their tissue.
 fn blanch(organs: Query<(&Mesh3d, &Rest, &OrganSupply), Changed<OrganSupply>>, mut meshes: ResMut<Assets<Mesh>>) {
     for (mesh, rest, supply) in organs.iter().filter(|(_, rest, supply)| supply.vertices.len() == rest.colors.len()) {
         let Some(mut mesh) = meshes.get_mut(mesh.id()) else { continue };

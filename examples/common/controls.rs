@@ -1,4 +1,4 @@
-//! Keys that steer every organ of an example, and the line that tells how far they are.
+//! Keys that control every organ of an example, and the status line with their progress.
 
 use super::{
     light::moist_tissue,
@@ -7,14 +7,14 @@ use super::{
 use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, light::NotShadowCaster, prelude::*};
 use bevy_vessels::prelude::*;
 
-/// What the keys of [`ControlsPlugin`] do.
+/// Help for the keys of [`ControlsPlugin`].
 pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours";
 
-/// An organ on show, vessels or none.
+/// An organ of the example, with or without vessels.
 #[derive(Component)]
 pub struct Organ;
 
-/// Space pauses, `.` steps, `A` and `V` show arteries and veins, `C` changes what colours tell. Where there is a window.
+/// With a window: space pauses, `.` steps, `A` and `V` toggle arteries and veins, `C` changes the meaning of colours.
 pub struct ControlsPlugin;
 
 impl Plugin for ControlsPlugin {
@@ -25,7 +25,7 @@ impl Plugin for ControlsPlugin {
     }
 }
 
-/// What organs are made of.
+/// The assets of organs.
 #[derive(SystemParam)]
 pub struct OrganAssets<'w> {
     meshes: ResMut<'w, Assets<Mesh>>,
@@ -33,7 +33,8 @@ pub struct OrganAssets<'w> {
 }
 
 impl OrganAssets<'_> {
-    /// Spawns what is seen of an organ: its mesh, of moist tissue, tinted. A tint with an alpha below 1 lets the inside show.
+    /// Spawns the visible part of an organ: its mesh, as tinted moist tissue. A tint with an alpha below 1 shows the
+    /// inside.
     pub fn spawn<'a>(
         &mut self,
         commands: &'a mut Commands,
@@ -42,7 +43,7 @@ impl OrganAssets<'_> {
         place: Transform,
     ) -> EntityCommands<'a> {
         let material = moist_tissue(tint);
-        // Without a renderer there are no materials, and nobody looks.
+        // Without a renderer there are no materials.
         let material = self.materials.as_mut().map(|materials| materials.add(material)).unwrap_or_default();
         let mut organ = commands.spawn((Organ, Mesh3d(self.meshes.add(mesh)), MeshMaterial3d(material), place));
         if tint.alpha() < 1.0 {
@@ -84,7 +85,7 @@ fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>
     }
 }
 
-/// Tells how far the growth is.
+/// Writes the progress of the growth.
 pub fn tell(
     organs: Query<(&Vasculature, &GrowthProgress, &GrowthControl)>,
     diagnostics: Res<bevy::diagnostic::DiagnosticsStore>,

@@ -1,10 +1,10 @@
-//! Looking at an organ from within: the camera travels along a line, and carries the only light.
+//! A view of an organ from inside: the camera travels along a line, and carries the only light.
 
 use crate::common::{light::Endoscope, studio::StatusLine};
 use bevy::prelude::*;
 use bevy_panorbit_camera::PanOrbitCamera;
 
-/// The way through an organ, in the world, with its points at equal distances.
+/// The line through an organ, in the world, with its points at equal distances.
 #[derive(Resource)]
 pub struct Lumen {
     line: Vec<Vec3>,
@@ -12,10 +12,10 @@ pub struct Lumen {
 }
 
 impl Lumen {
-    /// How far ahead the camera looks, as a share of the line's points.
+    /// Distance at which the camera looks ahead, as a share of the line's points.
     const AHEAD: f32 = 0.08;
 
-    /// A way that begins at the point nearest to `start`.
+    /// A line that begins at the point nearest to `start`.
     pub fn new(line: Vec<Vec3>, start: Vec3) -> Self {
         let nearest = line.iter().map(|point| point.distance(start)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
         Self { at: nearest.map_or(0.0, |(index, _)| index as f32), line }
@@ -27,14 +27,14 @@ impl Lumen {
         self.line.get(index).map_or(next, |point| point.lerp(next, at - index as f32))
     }
 
-    /// Goes on by a share of the whole line, toward its start.
+    /// Moves on by a share of the whole line, towards its start.
     fn travel(&mut self, share: f32) {
         let last = self.line.len() as f32 - 1.0;
         self.at = (self.at - share * last).clamp(last * (Self::AHEAD + 0.04), last);
     }
 }
 
-/// `I` goes in and out, ↑ and ↓ travel. For organs with a [`Lumen`].
+/// `I` enters and leaves, ↑ and ↓ travel. For organs with a [`Lumen`].
 pub fn look_inside(
     keys: Res<ButtonInput<KeyCode>>,
     time: Res<Time>,

@@ -1,9 +1,9 @@
-//! What the blood does, in figures: read from the organs, shown over the picture.
+//! Figures of the circulation, read from the organs and shown over the picture.
 
 use bevy::{ecs::system::SystemParam, prelude::*};
 use bevy_vessels::plugin::{BloodLoss, OpenEnd, OrganSupply, Patient, Perfusion, VesselSystems};
 
-/// Everything that is told of the blood.
+/// The sources of the figures.
 #[derive(SystemParam)]
 pub struct Figures<'w, 's> {
     organs: Query<'w, 's, (&'static Perfusion, &'static BloodLoss, &'static OrganSupply, Option<&'static Patient>)>,
@@ -15,9 +15,9 @@ pub struct Figures<'w, 's> {
 pub struct Reading {
     /// Ends whose lumen is open, bleeding or not.
     pub open_ends: usize,
-    /// What all ends lose, in mL/min.
+    /// Loss of all ends, in mL/min.
     pub rate: f64,
-    /// What was lost since the beginning, in mL.
+    /// Total loss, in mL.
     pub loss: f64,
     /// Share of the tissue that lacks blood.
     pub ischaemic_share: f32,
@@ -26,7 +26,7 @@ pub struct Reading {
 }
 
 impl Figures<'_, '_> {
-    /// The figures now, summed over the organs; the worst of their shares and pressures.
+    /// The present figures, summed over the organs; for shares and pressures, the worst.
     pub fn read(&self) -> Reading {
         let mut reading = Reading { open_ends: self.ends.iter().count(), root_pressure: f64::INFINITY, ..default() };
         for (perfusion, loss, supply, patient) in &self.organs {

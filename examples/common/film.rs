@@ -1,8 +1,8 @@
-//! Blood on the organ: a film that wells up, runs down and pools, and breathes with the organ beneath it.
+//! Blood on the organ: a film that wells up, runs down and pools, and moves with the breathing organ.
 //!
-//! The film is a depth on each cell of the [`Skin`]. What stands above a thin layer that sticks runs down the slope, as
-//! fast as a thin film of blood does, and its own depth spreads it; at the edge it stands before it wets what is dry. None
-//! is lost: what hangs from below drips off. It is drawn as one mesh over the wet cells, clear where it is thin and dark
+//! The film is a depth on each cell of the [`Skin`]. A thin layer sticks; blood above it runs down the slope as fast as
+//! a thin film does, and its depth spreads it. At the edge it rises before it wets dry cells. None is lost: blood that
+//! hangs from the underside drips off. It is drawn as one mesh over the wet cells, clear where it is thin and dark
 //! where it is deep.
 
 use super::{skin::Skin, surface::Surface};
@@ -17,32 +17,32 @@ use bevy_vessels::synthesis::{mesh::SurfacePoint, units::Volume};
 
 /// Longest step of the flow, in seconds.
 const STEP: f32 = 0.008;
-/// Depth that sticks to tissue, that which stands at the edge before it wets what is dry, and that at which drops fall from
-/// below, in metres.
+/// Depth that sticks to tissue, depth at the edge before it wets dry cells, and depth at which drops fall from the
+/// underside, in metres.
 const STICKS: f32 = 0.000_12;
 const STANDS: f32 = 0.000_55;
 const DRIPS: f32 = 0.0022;
-/// Share of what hangs around a drop that it takes along.
+/// Share of the blood around a drop that falls with it.
 const GATHERED: f32 = 0.7;
-/// Speed of a thin film on a slope, in metres a second for the square of its depth in metres: weight over three times the
-/// viscosity; and the fastest that it runs.
+/// Speed of a thin film on a slope, in metres a second per square metre of squared depth: weight over three times the
+/// viscosity; and its largest speed.
 const MOBILITY: f32 = 1060.0 * 9.81 / (3.0 * 0.0035);
 const FASTEST: f32 = 0.09;
-/// How much a film spreads by its depth, against its weight: its surface tension, and tissue that it wets.
+/// Spreading of a film by its depth, relative to its weight: surface tension, and tissue that it wets.
 const SPREAD: f32 = 1.5;
-/// Depths below which the film is clear and above which it hides what is below, and the depth that takes two thirds of the
-/// way from the light colour to the dark one, in metres.
+/// Depths below which the film is clear and above which it is opaque, and the depth at two thirds of the way from the
+/// light to the dark colour, in metres.
 const CLEAR: f32 = 0.000_03;
 const OPAQUE: f32 = 0.000_15;
 const DARK: f32 = 0.0005;
 const LIGHT_COLOR: Vec3 = Vec3::new(0.20, 0.003, 0.005);
 const DARK_COLOR: Vec3 = Vec3::new(0.055, 0.0006, 0.0014);
-/// How far above the surface the film begins, in world units.
+/// Height of the film's base above the surface, in world units.
 const LIFT: f32 = 0.0006;
-/// How much deeper than it is the film is drawn, so that its edge catches the light.
+/// Factor by which the film is drawn deeper, so that its edge catches the light.
 const RELIEF: f32 = 1.6;
 
-/// A cell without a number in the mesh.
+/// The number of a cell outside the mesh.
 const NONE: u32 = u32::MAX;
 
 /// The film on the organ.
@@ -51,13 +51,13 @@ pub struct Film {
     skin: Skin,
     /// Metres of a world unit.
     unit: f32,
-    /// Depth on each cell, in metres, and what it changes by in a step.
+    /// Depth on each cell, in metres, and its change in a step.
     depths: Vec<f32>,
     changes: Vec<f32>,
     /// Cells that have ever been wet.
     wet: Vec<u32>,
     is_wet: Vec<bool>,
-    /// Numbers of cells in the mesh, while that is made.
+    /// Numbers of cells in the mesh, while the mesh is made.
     numbers: Vec<u32>,
     /// Neighbours of a cell, while it flows.
     around: Vec<u32>,
@@ -82,7 +82,7 @@ impl Film {
         }
     }
 
-    /// Adds blood at a place on the surface at rest: half of it to the nearest cell, half around that.
+    /// Adds blood at a place on the surface at rest: half of it to the nearest cell, half to those around it.
     pub fn add(&mut self, place: &SurfacePoint, volume: Volume) {
         let cell = self.skin.nearest(place);
         let around: Vec<u32> = self.skin.neighbours(cell).collect();
@@ -106,7 +106,7 @@ impl Film {
         }
     }
 
-    /// Lets the film flow. Calls `drip` for blood that falls off, with where, at rest, and the normal.
+    /// Lets the film flow. Calls `drip` for blood that falls off, with the point at rest and the normal.
     pub fn flow(&mut self, seconds: f32, mut drip: impl FnMut(Vec3, Vec3, Volume)) {
         let steps = (seconds / STEP).ceil();
         for _ in 0..steps as u32 {
@@ -127,7 +127,7 @@ impl Film {
         }
     }
 
-    /// Takes what becomes a drop: all that hangs from a cell, and most of what hangs beside it.
+    /// Takes the blood of a drop: all that hangs from a cell, and most from the cells beside it.
     fn gather(&mut self, cell: u32) -> Volume {
         let mut around = std::mem::take(&mut self.around);
         around.clear();
@@ -142,7 +142,7 @@ impl Film {
         Volume::from_cubic_metres(f64::from(cubic_metres))
     }
 
-    /// Lets what stands on a cell run down, and spread to neighbours with less.
+    /// Lets the blood on a cell run down, and spread to neighbours with less.
     fn flow_from(&mut self, cell: u32, seconds: f32) {
         let free = self.depths[cell as usize] - STICKS;
         if free <= 0.0 {
@@ -166,7 +166,7 @@ impl Film {
             let lower = self.depths[cell as usize] - self.depths[to as usize];
             if lower > 0.0 {
                 let speed = mobility * SPREAD * lower / length;
-                // Never so much that it would stand higher there than here.
+                // Never so much that it would be deeper there than here.
                 let most = 0.06 * lower * area.min(self.area(to));
                 self.pass(cell, to, (volume * speed * seconds / length).min(most));
             }
@@ -174,7 +174,7 @@ impl Film {
         self.around = around;
     }
 
-    /// Passes blood on at the end of the step: to a dry cell only where it stands high enough.
+    /// Passes blood on at the end of the step: to a dry cell only if it is deep enough.
     fn pass(&mut self, from: u32, to: u32, volume: f32) {
         if self.depths[to as usize] > 0.5 * STICKS || self.depths[from as usize] > STANDS {
             self.changes[from as usize] -= volume / self.area(from);
@@ -183,10 +183,9 @@ impl Film {
         }
     }
 
-    /// The mesh of the film as it is now; `None` where there is none to be seen, since a mesh without triangles can't be
-    /// drawn.
+    /// The present mesh of the film; `None` if nothing is visible, since a mesh without triangles can't be drawn.
     fn draw(&mut self, surface: &Surface) -> Option<Mesh> {
-        // Two rings around what is wet, over which the film fades.
+        // Two rings around the wet cells, over which the film fades.
         let mut cells: Vec<u32> =
             self.wet.iter().copied().filter(|&cell| self.depths[cell as usize] > 1.0e-6).collect();
         if cells.is_empty() {
@@ -199,7 +198,7 @@ impl Film {
         for (number, &cell) in cells[..inner].iter().enumerate() {
             for triangle in self.skin.triangles_around(cell) {
                 let corners = self.skin.triangles[triangle as usize].map(|corner| self.numbers[corner as usize]);
-                // Each triangle once: by the first of its corners.
+                // Each triangle once, by the first of its corners.
                 if corners.iter().all(|&corner| corner >= number as u32) {
                     indices.extend(corners);
                 }
@@ -222,7 +221,7 @@ impl Film {
         Some(mesh)
     }
 
-    /// Adds the neighbours of all cells from a number on that are not among them, and says how many there were.
+    /// Adds the missing neighbours of all cells from a number on, and returns the previous number of cells.
     fn surround(&mut self, cells: &mut Vec<u32>, from: usize) -> usize {
         let before = cells.len();
         for index in from..before {
@@ -236,7 +235,7 @@ impl Film {
         before
     }
 
-    /// Depths to be drawn: means over neighbours, without the grain of the cells. Those on the rim are 0.
+    /// Depths to be drawn: means over neighbours, which hide the cells. Those on the rim are 0.
     fn smooth_depths(&self, cells: &[u32], inner: usize) -> Vec<f32> {
         let mut depths: Vec<f32> = cells.iter().map(|&cell| self.depths[cell as usize]).collect();
         for _ in 0..3 {
@@ -263,7 +262,7 @@ impl Film {
     }
 }
 
-/// Colour of blood of a depth, linear, with how much it hides.
+/// Linear colour of blood of a depth, with its opacity.
 fn color(depth: f32) -> [f32; 4] {
     let share = ((depth - CLEAR) / (OPAQUE - CLEAR)).clamp(0.0, 1.0);
     let hidden = share * share * (3.0 - 2.0 * share);

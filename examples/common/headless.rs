@@ -1,4 +1,4 @@
-//! Drawing without a window: what there is to draw with, an app that draws to an image, and writing that image.
+//! Drawing without a window: finding an adapter, an app that draws to an image, and writing that image.
 
 use bevy::{
     app::{PluginGroupBuilder, ScheduleRunnerPlugin},
@@ -22,11 +22,11 @@ use std::{
     time::Duration,
 };
 
-/// What to say where there is nothing to draw with.
+/// The message for machines without an adapter.
 pub const HOW_TO_GET_PICTURES: &str =
     "no graphics adapter found: for pictures install a Vulkan driver (Debian, Ubuntu: apt install mesa-vulkan-drivers)";
 
-/// Name and driver of an adapter that Bevy could draw with, `None` when there is none. Bevy itself would panic.
+/// Name and driver of an adapter that Bevy can draw with, `None` if there is none. Bevy itself would panic.
 pub fn find_adapter() -> Option<String> {
     let backends = WgpuSettings::default().backends?;
     let instance = RenderInstance(Arc::new(WgpuWrapper::new(Default::default())));
@@ -37,36 +37,36 @@ pub fn find_adapter() -> Option<String> {
 
 /// Bevy's default plugins without window and event loop, for an app that runs frame after frame until it exits.
 ///
-/// With `draws` off there is no renderer either, and no adapter is needed.
+/// With `draws` off there is no renderer, and no adapter is needed.
 pub fn headless_plugins(draws: bool) -> PluginGroupBuilder {
     let settings = if draws { WgpuSettings::default() } else { WgpuSettings { backends: None, ..default() } };
-    // Where nothing is to be drawn, Bevy reports the want of a renderer as an error.
+    // If nothing is drawn, Bevy reports the missing renderer as an error.
     let silenced = if draws { "" } else { "bevy_render=off,bevy_gltf=error," };
     DefaultPlugins
         .build()
         .disable::<WinitPlugin>()
-        // the picture of a frame is the picture of that frame, not of the one before
+        // a picture must show its own frame, not the one before
         .disable::<PipelinedRenderingPlugin>()
         .set(LogPlugin { filter: format!("{silenced}{DEFAULT_FILTER}"), ..default() })
         .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
         .set(RenderPlugin {
             render_creation: settings.into(),
-            // else the first frames show the background alone
+            // otherwise the first frames show only the background
             synchronous_pipeline_compilation: true,
             ..default()
         })
         .add(ScheduleRunnerPlugin::run_loop(Duration::ZERO))
 }
 
-/// The image that cameras draw to instead of a window.
+/// The image to which cameras draw instead of a window.
 #[derive(Resource, Clone)]
 pub struct OffscreenTarget(pub Handle<Image>);
 
-/// Whether all shaders that were asked for are loaded and compiled, so that a picture shows everything.
+/// Whether all requested shaders are loaded and compiled, so that a picture shows everything.
 #[derive(Resource, Default)]
 pub struct PipelinesReady(pub bool);
 
-/// Makes an [`OffscreenTarget`] of a size and keeps [`PipelinesReady`] up to date. Comes after [`headless_plugins`].
+/// Makes an [`OffscreenTarget`] of a size and keeps [`PipelinesReady`] up to date. Add it after [`headless_plugins`].
 pub struct OffscreenPlugin {
     /// Width and height of the target, pixels.
     pub size: UVec2,
@@ -86,7 +86,7 @@ impl Plugin for OffscreenPlugin {
     }
 }
 
-/// Writes a picture as PNG, whole or not at all: beside its place first, then renamed.
+/// Writes a picture as PNG, whole or not at all: to a temporary file first, which is then renamed.
 pub fn write_picture(image: &Image, path: &Path) -> io::Result<()> {
     let picture = image.clone().try_into_dynamic().map_err(io::Error::other)?;
     if let Some(folder) = path.parent() {

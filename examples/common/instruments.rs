@@ -1,4 +1,4 @@
-//! Instruments: a scalpel that the mouse drags, keys for clamp and cautery, and clamps to be seen.
+//! Instruments: a scalpel that the mouse drags, keys for clamp and cautery, and visible clamps.
 
 use super::surface::Surface;
 use bevy::prelude::*;
@@ -9,19 +9,19 @@ use bevy_vessels::{
     synthesis::wound::{Blade, BladeError},
 };
 
-/// What the keys and the mouse do.
+/// Help for the keys and the mouse.
 pub const INSTRUMENTS_HELP: &str = "right drag  scalpel\nK U  clamp on, off\nB  cautery, while held\nZ  undo";
 
-/// How deep the scalpel goes, and how far its edge reaches out of the tissue. World units.
+/// Depth of the scalpel, and length of its edge outside the tissue, in world units.
 const DEPTH: f32 = 0.035;
 const ABOVE: f32 = 0.01;
-/// Radius of what the cautery's tip heats, and the widest vessel that it seals.
+/// Radius heated by the cautery's tip, and the widest vessel that it seals.
 const CAUTERY_RADIUS: f32 = 0.022;
 const SEALED_CALIBRE: f32 = 0.02;
-/// How near to a vessel one has to point to clamp it.
+/// Distance from the pointer within which a vessel is clamped.
 const REACH: f32 = 0.03;
 
-/// Instruments in the user's hands, where there is a window.
+/// Instruments for the user, if there is a window.
 pub struct InstrumentsPlugin;
 
 impl Plugin for InstrumentsPlugin {
@@ -33,7 +33,7 @@ impl Plugin for InstrumentsPlugin {
     }
 }
 
-/// The scalpel's edge when it is held along a direction and touches a point: from just outside to a set depth.
+/// The scalpel's edge, held along a direction at a point: from just outside to a set depth.
 fn edge(touch: Vec3, along: Vec3) -> [Vec3; 2] {
     [touch - ABOVE * along, touch + DEPTH * along]
 }
@@ -59,15 +59,15 @@ fn clamp(vessels: &mut CuttableVessels, touch: Vec3) {
     vessels.clamp(touch, REACH);
 }
 
-/// Where the cursor points to: the point of the surface, and the direction of the view.
+/// The point of the surface under the cursor, and the direction of the view.
 fn aim(window: &Window, camera: (&Camera, &GlobalTransform), surface: &Surface) -> Option<[Vec3; 2]> {
     let ray = camera.0.viewport_to_world(camera.1, window.cursor_position()?).ok()?;
     let (touch, _) = surface.hit(ray.origin, ray.get_point(100.0))?;
     Some([touch, *ray.direction])
 }
 
-/// Dragging with the right button cuts, from where the cursor was in the last frame to where it is. One drag is one stroke,
-/// also where it leaves the organ in between.
+/// Dragging with the right button cuts, from the cursor's last position to the present one. One drag is one stroke,
+/// even if it leaves the organ in between.
 fn slash(
     buttons: Res<ButtonInput<MouseButton>>,
     window: Single<&Window>,
@@ -91,7 +91,7 @@ fn slash(
     Ok(())
 }
 
-/// Keys for what is done at the cursor, and for undo and pause.
+/// Keys for actions at the cursor, and for undo and pause.
 fn operate(
     keys: Res<ButtonInput<KeyCode>>,
     window: Single<&Window>,
@@ -124,11 +124,11 @@ fn operate(
     Ok(())
 }
 
-/// A clamp to be seen.
+/// A visible clamp.
 #[derive(Component)]
 struct ClampModel;
 
-/// A small bar of steel across each vessel that is clamped.
+/// Shows a small steel bar across each clamped vessel.
 fn show_clamps(
     mut commands: Commands,
     changed: Query<(Entity, &Vessels, &VesselWounds), Or<(Changed<VesselWounds>, Changed<Vessels>)>>,

@@ -1,11 +1,11 @@
-//! How organs look: moist tissue under the soft lights of a theatre, or under an endoscope's own.
+//! The look of organs: moist tissue under the soft lights of an operating room, or under an endoscope's light.
 
 use bevy::{
     light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap},
     prelude::*,
 };
 
-/// Tissue under a thin film of fluid. The tint multiplies the mesh's own colours, where it has any.
+/// Tissue under a thin film of fluid. The tint multiplies the mesh's own colours, if it has any.
 pub fn moist_tissue(tint: Color) -> StandardMaterial {
     StandardMaterial {
         base_color: tint,
@@ -31,7 +31,7 @@ impl Plugin for LightPlugin {
     }
 }
 
-/// Whether the only light is the one on the camera, as within an organ.
+/// Whether the camera's light is the only one, as inside an organ.
 #[derive(Resource, Default)]
 pub struct Endoscope(pub bool);
 
@@ -43,14 +43,14 @@ struct RoomLight(f32);
 #[derive(Component)]
 pub struct HeadLight;
 
-/// From where the warm key light comes: the upper left.
+/// Position of the warm key light, at the upper left.
 pub const KEY_LIGHT: Vec3 = Vec3::new(-1.4, 2.2, 2.2);
 const SKY: f32 = 620.0;
 const SKY_INSIDE: f32 = 60.0;
 const HEAD_LIGHT: f32 = 260.0;
 
 fn spawn_lights(mut commands: Commands) {
-    // A key light, and a cool one from behind that draws the outline.
+    // A key light, and a cool one from behind for the outline.
     let cascades = CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 4.0, ..default() }.build();
     let key = DirectionalLight { color: Color::srgb(1.0, 0.96, 0.9), shadow_maps_enabled: true, ..default() };
     let key_place = Transform::from_translation(KEY_LIGHT).looking_at(Vec3::ZERO, Vec3::Y);
@@ -59,7 +59,7 @@ fn spawn_lights(mut commands: Commands) {
     commands.spawn((edge, Transform::from_xyz(2.0, 0.6, -1.6).looking_at(Vec3::ZERO, Vec3::Y), RoomLight(4_000.0)));
 }
 
-/// What a camera carries: soft light from all around, and the endoscope's.
+/// The lights of a camera: soft light from all around, and the endoscope's.
 pub fn camera_lights(images: &mut Assets<Image>) -> impl Bundle {
     let sky = EnvironmentMapLight::hemispherical_gradient(
         images,

@@ -1,4 +1,4 @@
-//! What the examples share: a studio to look at organs in, with a window or without.
+//! Shared code of the examples: a studio for organs, with or without a window.
 
 pub mod controls;
 pub mod headless;

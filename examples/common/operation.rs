@@ -24,36 +24,37 @@ use bevy_vessels::{
 use clap::ValueEnum;
 use std::{io::Write, time::Duration};
 
-/// What is done where there is no window.
+/// The operation without a window.
 #[derive(ValueEnum, Clone, Copy, Debug, Default, PartialEq)]
 pub enum Script {
-    /// A cut across the widest artery in view, a clamp on what feeds the end that bleeds most, then cautery along the cut.
+    /// A cut across the widest artery in view, a clamp on the artery of the end that bled most, then cautery along the
+    /// cut.
     #[default]
     Demo,
 }
 
-/// Seconds of a frame. All that happens is the same on any machine.
+/// Duration of a frame, so that the operation is the same on any machine.
 const FRAME: Duration = Duration::from_millis(25);
 /// Seconds between two lines of the table.
 const INTERVAL: f64 = 0.1;
-/// When the cut begins and ends, and how long it is in world units.
+/// Times of the cut's begin and end, and its length in world units.
 const CUT: [f64; 2] = [0.3, 0.8];
 const CUT_LENGTH: f32 = 0.11;
-/// How far above the end that bleeds most the clamp goes on, in world units, and how far at least the root is from the cut.
+/// Distance of the clamp above the end that bled most, and least distance of the root from the cut, in world units.
 const CLAMP_ABOVE: f32 = 0.03;
 const ROOT_ABOVE: f32 = 0.06;
-/// Least cosine between the normal of the skin that is cut and the directions that it is seen and lit from.
+/// Least cosine between the normal of the cut skin and the directions to the viewer and the light.
 const FACING: f32 = 0.5;
 const CLAMP: f64 = 5.0;
 const CAUTERY: f64 = 8.0;
 const END: f64 = 9.5;
-/// Over how many seconds before each step the bleeding is told: more than a beat of the heart.
+/// Seconds before each step over which the bleeding is averaged: more than a heartbeat.
 const TOLD_OVER: f64 = 1.0;
-/// When which picture is taken.
+/// Times and names of the pictures.
 const PICTURES: [(f64, &str); 4] =
     [(0.1, "cutting_before.png"), (0.875, "cutting_cut.png"), (4.9, "cutting.png"), (7.5, "cutting_clamped.png")];
 
-/// Operates where there is no window.
+/// Operates without a window.
 pub struct OperationPlugin(pub Script);
 
 impl Plugin for OperationPlugin {
@@ -69,19 +70,19 @@ impl Plugin for OperationPlugin {
     }
 }
 
-/// How far the operation is.
+/// The progress of the operation.
 #[derive(Resource, Default)]
 struct Operation {
     site: Option<Site>,
     time: f64,
     pictures: usize,
     table: Vec<(f64, Reading)>,
-    /// The scalpel's, once it is on.
+    /// The scalpel's stroke, once it has begun.
     stroke: Option<StrokeId>,
     is_over: bool,
 }
 
-/// Where it is done, in the world.
+/// The site of the operation, in the world.
 #[derive(Clone, Copy)]
 struct Site {
     wound: Vec3,
@@ -91,7 +92,7 @@ struct Site {
 }
 
 impl Site {
-    /// The widest artery in view and in the light, with some vessel between it and its root.
+    /// The widest artery in view and lit, with some vessel between it and its root.
     fn find(vessels: &Vessels, place: &GlobalTransform, surface: &Surface) -> Option<Self> {
         let tree = vessels.tree();
         let at = |node: NodeId| place.transform_point(tree.positions()[node.index()]);
@@ -110,21 +111,21 @@ impl Site {
         Some(Self { wound, normal, across: along.cross(normal).normalize_or(Vec3::X) })
     }
 
-    /// Where the scalpel is at a share of its way, and in which direction its edge points.
+    /// The scalpel's point at a share of its path, and the direction of its edge.
     fn scalpel(&self, share: f32, surface: &Surface) -> [Vec3; 2] {
         let over = self.wound + self.across * CUT_LENGTH * (share - 0.5);
         let touch = surface.hit(over + 0.05 * self.normal, over - 0.1 * self.normal);
         [touch.map_or(over, |(touch, _)| touch), -self.normal]
     }
 
-    /// From nearby, on the line along which it is seen from the front: nothing is in the way there.
+    /// A near view, on the line of sight from the front, where nothing is in the way.
     fn view(&self, surface: &Surface) -> Viewpoint {
         let eye = self.wound + 0.25 * (surface.eye - self.wound).normalize_or(Vec3::Z);
         Viewpoint { eye, target: self.wound, up: Vec3::Y }
     }
 }
 
-/// The first node on the way to the root, from a node on, that passes a test.
+/// The first node that passes a test, from a node towards the root.
 fn above(tree: &VesselTree, node: NodeId, passes: impl Fn(NodeId) -> bool) -> Option<NodeId> {
     std::iter::successors(Some(node), |&node| tree.parent(node)).find(|&node| passes(node))
 }
@@ -138,13 +139,13 @@ struct Patient<'w, 's> {
 }
 
 impl Patient<'_, '_> {
-    /// Where to operate.
+    /// The site to operate on.
     fn site(&self, surface: &Surface) -> Option<Site> {
         let arteries = self.vessels.iter().filter(|(vessels, _)| vessels.kind() == VesselKind::Artery);
         arteries.filter_map(|(vessels, place)| Site::find(vessels, place, surface)).next()
     }
 
-    /// Where the artery that has lost most is to be clamped: on the way from its root to its end, a little before that.
+    /// The clamp's place on the artery that has lost most: a little before its end.
     fn feeds_most(&self) -> Option<(Entity, Place)> {
         let fed = self.ends.iter().filter(|(end, _)| (end.kind, end.side) == (VesselKind::Artery, EndSide::Proximal));
         let (end, tip) = fed.max_by(|(a, _), (b, _)| a.lost.ml().total_cmp(&b.lost.ml()))?;
@@ -152,7 +153,7 @@ impl Patient<'_, '_> {
         let tree = vessels.tree();
         let is_above = |node: NodeId| {
             let at = to_world.transform_point(tree.positions()[node.index()]);
-            // the segment below a root is the last that can be clamped
+            // the segment at a root is the last that can be clamped
             let is_last = tree.parent(node).is_none_or(|parent| tree.parent(parent).is_none());
             is_last || at.distance(tip.translation()) > CLAMP_ABOVE
         };
@@ -160,7 +161,7 @@ impl Patient<'_, '_> {
     }
 }
 
-/// Goes on by a frame, unless a picture is being taken.
+/// Advances by a frame, unless a picture is being taken.
 fn operate(
     time: Res<Time>,
     mut operation: ResMut<Operation>,
@@ -179,7 +180,7 @@ fn operate(
             eprintln!("{error}");
             exit.write(AppExit::error());
         }
-        // the blood flows and its supply is known: from here on, all is the same whatever the machine
+        // the blood flows and its supply is known: from here on, everything is the same on any machine
         if patient.blood.iter().any(|(state, supply)| state.flows() && !supply.vertices.is_empty()) {
             operation.site = patient.site(&surface);
             more.expected = operation.site.is_some();
@@ -220,7 +221,7 @@ fn operate(
     Ok(())
 }
 
-/// Keeps the figures, and writes them at the end.
+/// Records the figures, and writes them at the end.
 fn record(
     mut operation: ResMut<Operation>,
     figures: Figures,
@@ -243,7 +244,7 @@ fn record(
     Ok(())
 }
 
-/// What was lost up to a time, in mL/min.
+/// Mean rate of loss before a time, in mL/min.
 fn mean_rate(table: &[(f64, Reading)], end: f64) -> f64 {
     let lost =
         |at: f64| table.iter().rfind(|(time, _)| *time <= at).map_or((0.0, 0.0), |(time, now)| (*time, now.loss));
@@ -251,7 +252,7 @@ fn mean_rate(table: &[(f64, Reading)], end: f64) -> f64 {
     60.0 * (after - before) / (to - from)
 }
 
-/// What was done last, at a time.
+/// The last step before a time.
 fn last_step(time: f64) -> &'static str {
     let steps = [(CAUTERY, "cautery"), (CLAMP, "clamp"), (CUT[0], "cut")];
     steps.into_iter().find(|(at, _)| *at < time).map_or("none", |(_, step)| step)

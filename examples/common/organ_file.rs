@@ -1,4 +1,4 @@
-//! Organs from glTF files, whatever parts and unit they come in.
+//! Organs from glTF files, with any parts and unit.
 
 use crate::common::studio::to_unit_size;
 use bevy::{
@@ -11,7 +11,8 @@ use bevy::{
 use bevy_vessels::{plugin::triangle_mesh, synthesis::mesh::TriangleMesh};
 use std::path::PathBuf;
 
-/// Loads an organ's file when there is an [`OrganFile`], and triggers [`OrganLoaded`]. A file that is no organ ends the app.
+/// Loads an organ's file when there is an [`OrganFile`], and triggers [`OrganLoaded`]. A file without an organ ends the
+/// app.
 pub struct OrganFilePlugin;
 
 impl Plugin for OrganFilePlugin {
@@ -20,31 +21,31 @@ impl Plugin for OrganFilePlugin {
     }
 }
 
-/// An organ's file on its way.
+/// An organ's file to be loaded.
 #[derive(Resource)]
 pub struct OrganFile {
-    /// Where it is.
+    /// Its path.
     pub path: PathBuf,
     handle: Option<Handle<Gltf>>,
 }
 
 impl OrganFile {
-    /// Wishes for a file.
+    /// Requests a file.
     pub fn new(path: PathBuf) -> Self {
         Self { path, handle: None }
     }
 }
 
-/// An organ is there.
+/// An organ has been loaded.
 #[derive(Event)]
 pub struct OrganLoaded {
     /// All its triangles.
     pub mesh: Mesh,
-    /// What makes it one unit large.
+    /// The transform that makes it one unit large.
     pub place: Transform,
 }
 
-/// What is in the files that are loaded.
+/// The contents of loaded files.
 #[derive(SystemParam)]
 struct Files<'w> {
     server: Res<'w, AssetServer>,
@@ -69,7 +70,7 @@ fn load(mut commands: Commands, mut file: ResMut<OrganFile>, files: Files, mut e
 }
 
 impl Files<'_> {
-    /// All triangles of a file as one mesh, `None` while it is on its way.
+    /// All triangles of a file as one mesh, `None` while it is loading.
     fn organ(&self, file: &Handle<Gltf>) -> Result<Option<OrganLoaded>> {
         if let LoadState::Failed(error) = self.server.load_state(file) {
             return Err(error.into());

@@ -1,4 +1,4 @@
-//! Without a window: vessels grow frame by frame, then pictures are taken, networks written and figures printed.
+//! Runs without a window: vessels grow frame by frame, then pictures are taken, networks written and figures printed.
 
 use super::{
     headless::{OffscreenTarget, PipelinesReady, write_picture},
@@ -24,12 +24,12 @@ use std::{io, time::Duration};
 #[derive(Resource, Clone, Default)]
 pub struct Shots(pub Vec<Shot>);
 
-/// Whether pictures will be wanted beyond those in [`Shots`]: then the app goes on after the last.
+/// Further pictures beyond those in [`Shots`]: with these, the app goes on after the last.
 #[derive(Resource, Clone, Copy, Default)]
 pub struct MoreShots {
-    /// Whether there will be any.
+    /// Whether any are expected.
     pub expected: bool,
-    /// How many of [`Shots`] were taken, or can't be.
+    /// Number of [`Shots`] that were taken, or can't be.
     pub taken: usize,
 }
 
@@ -38,7 +38,7 @@ pub struct MoreShots {
 pub struct Shot {
     /// Name of the file.
     pub file: &'static str,
-    /// Where the camera stands.
+    /// Position and direction of the camera.
     pub view: Viewpoint,
     /// Vertical field of view, in degrees.
     pub field_of_view: f32,
@@ -57,7 +57,7 @@ impl Plugin for PhotoPlugin {
     }
 }
 
-/// Frames that a view is drawn before its picture is taken: shadows and buffers have caught up then.
+/// Frames for which a view is drawn before its picture is taken, so that shadows and buffers are up to date.
 const STILL_FRAMES: u32 = 2;
 /// Pixels drawn for one pixel of a picture, along each side.
 pub const OVERSAMPLING: u32 = 2;
@@ -75,7 +75,7 @@ fn grown(session: Res<Session>) -> bool {
     session.grown
 }
 
-/// An organ that cannot grow, or a picture that cannot be written, ends the app with an error.
+/// Ends the app with an error if an organ cannot grow or a picture cannot be written.
 fn give_up(mut failures: MessageReader<GrowthFailed>, mut exit: MessageWriter<AppExit>) {
     for failure in failures.read() {
         eprintln!("{}", failure.error);
@@ -83,7 +83,7 @@ fn give_up(mut failures: MessageReader<GrowthFailed>, mut exit: MessageWriter<Ap
     }
 }
 
-/// Shares the steps out over the frames that the user asked for; what is left then is done at once.
+/// Spreads the steps over the frames that the user asked for; the rest is then done at once.
 fn grow(
     args: Res<StudioArgs>,
     time: Res<Time<Real>>,
@@ -119,7 +119,7 @@ fn photograph(
 ) {
     more.taken = if offscreen.is_some() { session.shot } else { shots.0.len() };
     let is_wanted = more.taken < shots.0.len();
-    // between pictures nobody looks
+    // no camera is needed between pictures
     for (mut camera, ..) in camera.iter_mut().filter(|(camera, ..)| camera.is_active != is_wanted) {
         camera.is_active = is_wanted;
     }
@@ -164,7 +164,7 @@ fn photograph(
     }
 }
 
-/// A picture with half as many pixels each way, each the mean of four: that smooths edges, which on a software driver costs
+/// A picture with half as many pixels each way, each the mean of four. This smooths edges, and costs a software driver
 /// less than multisampling.
 fn smaller(image: &Image) -> io::Result<Image> {
     let picture = image.clone().try_into_dynamic().map_err(io::Error::other)?;

@@ -1,20 +1,20 @@
-//! A net of small cells over an organ's surface, for what lies on it.
+//! A net of small cells over an organ's surface, for the blood on it.
 
 use bevy::prelude::*;
 use bevy_vessels::synthesis::mesh::{SurfacePoint, TriangleMesh};
 use std::collections::HashMap;
 
-/// Distance between neighbouring cells, in world units, where that doesn't take more than the most parts of an edge.
+/// Distance between neighbouring cells, in world units, and the most parts of an edge, which may limit it.
 const SPACING: f32 = 0.003;
 const MOST_PARTS: u32 = 6;
 
 /// Points on the surface at rest, joined by triangles that divide those of the organ.
 pub struct Skin {
-    /// Where the points are.
+    /// Positions of the points.
     pub positions: Vec<Vec3>,
-    /// Unit normals of the surface there.
+    /// Unit normals of the surface at the points.
     pub normals: Vec<Vec3>,
-    /// The part of the surface that belongs to each, in square world units.
+    /// The part of the surface of each point, in square world units.
     pub areas: Vec<f32>,
     /// The triangles.
     pub triangles: Vec<[u32; 3]>,
@@ -22,7 +22,7 @@ pub struct Skin {
     parts: u32,
     /// The points of each triangle of the organ, row by row.
     points: Vec<u32>,
-    /// Where the triangles around each point begin in the list of them.
+    /// Start of the triangles around each point in their list.
     first: Vec<u32>,
     around: Vec<u32>,
 }
@@ -51,7 +51,7 @@ impl Skin {
         let welding = surface.weld();
         let normals = surface.vertex_normals_with(&welding);
         let n = self.parts;
-        // Points on edges and corners belong to several triangles: they are known by the edge and the way along it.
+        // Points on edges and corners belong to several triangles: the edge and the position on it identify them.
         let mut shared: HashMap<[u32; 3], u32> = HashMap::new();
         for (number, corners) in surface.triangles().iter().enumerate() {
             let at = surface.corners(number);
@@ -116,25 +116,25 @@ impl Skin {
         self.around[from..to].iter().copied()
     }
 
-    /// The neighbours of a point, most of them twice: once for each triangle that they share with it.
+    /// The neighbours of a point, most of them twice: once for each shared triangle.
     pub fn neighbours(&self, point: u32) -> impl Iterator<Item = u32> + '_ {
         let others = move |triangle: u32| self.triangles[triangle as usize].into_iter();
         self.triangles_around(point).flat_map(others).filter(move |&other| other != point)
     }
 
-    /// How far it is from one point to another, in world units.
+    /// Distance between two points, in world units.
     pub fn distance(&self, from: u32, to: u32) -> f32 {
         self.positions[from as usize].distance(self.positions[to as usize])
     }
 
-    /// Where it goes down from a point, along the surface: as long as it is steep, 1 where it is vertical.
+    /// The downhill direction at a point, along the surface. Its length is the steepness: 1 if vertical.
     pub fn downhill(&self, point: u32) -> Vec3 {
         let normal = self.normals[point as usize];
         normal * normal.y - Vec3::Y
     }
 
-    /// The way from a point to its neighbours in a direction. Of the triangle that lies there, both other corners take a
-    /// share, so that the mean way is in the direction, however the triangles lie. `None` at a border.
+    /// The way from a point to its neighbours in a direction. Both other corners of the triangle in that direction take
+    /// a share, so that the mean way has the direction, however the triangles lie. `None` at a border.
     pub fn way(&self, point: u32, direction: Vec3) -> Option<Way> {
         let at = self.positions[point as usize];
         self.triangles_around(point).find_map(|triangle| {
@@ -178,7 +178,7 @@ fn place(n: u32, i: u32, j: u32) -> usize {
     (i * (n + 1) - i * i.saturating_sub(1) / 2 + j) as usize
 }
 
-/// What a point on an edge or a corner is known by; `None` within a triangle.
+/// The key of a point on an edge or a corner; `None` inside a triangle.
 fn border(shares: [u32; 3], corners: [u32; 3]) -> Option<[u32; 3]> {
     let on: Vec<(u32, u32)> = corners.into_iter().zip(shares).filter(|&(_, share)| share > 0).collect();
     match on[..] {

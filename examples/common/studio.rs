@@ -1,4 +1,4 @@
-//! A place to look at organs: lights, a camera, and a window to look through or a folder to put pictures in.
+//! A studio for organs: lights, a camera, and a window or a folder for pictures.
 
 use super::{
     headless::{HOW_TO_GET_PICTURES, OffscreenPlugin, OffscreenTarget, find_adapter, headless_plugins},
@@ -15,10 +15,10 @@ use bevy_panorbit_camera::{PanOrbitCamera, PanOrbitCameraPlugin};
 use bevy_vessels::synthesis::organ::Viewpoint;
 use std::path::PathBuf;
 
-/// What every example understands.
+/// Arguments of every example.
 #[derive(clap::Args, Resource, Clone, Debug)]
 pub struct StudioArgs {
-    /// Write pictures and networks instead of opening a window. So it is where there is no display, too.
+    /// Write pictures and networks instead of opening a window. Without a display, this is the default.
     #[arg(long)]
     pub headless: bool,
     /// Frames over which the vessels grow, without a window.
@@ -38,26 +38,26 @@ impl StudioArgs {
     }
 }
 
-/// Bevy with a window, or without, and everything needed to see an organ of about one unit at the origin.
+/// Bevy with or without a window, and everything needed to see an organ of about one unit at the origin.
 pub struct StudioPlugin {
-    /// What the user asked for.
+    /// The user's arguments.
     pub args: StudioArgs,
     /// Title of the window.
     pub title: &'static str,
-    /// What the keys do, one line each.
+    /// Help for the keys, one line each.
     pub help: &'static str,
-    /// What the keys of this example alone do.
+    /// Help for the keys of this example alone.
     pub more_help: &'static str,
 }
 
-/// Whether there is a window.
+/// The kind of view.
 #[derive(Resource, Clone, Copy, PartialEq, Eq)]
 pub enum View {
     /// A window, with a camera that the mouse turns.
     Window,
     /// Pictures are taken.
     Pictures,
-    /// There is nothing to draw with.
+    /// No adapter to draw with.
     Nothing,
 }
 
@@ -74,7 +74,7 @@ impl Plugin for StudioPlugin {
         app.insert_resource(view)
             .insert_resource(self.args.clone())
             .insert_resource(Help(format!("{}\n{}", self.help, self.more_help)));
-        // Examples name their pictures also where a window is in the way of taking them.
+        // Examples add their pictures even if a window is open and none are taken.
         app.init_resource::<StatusLine>().init_resource::<Shots>();
         if view != View::Nothing {
             app.add_plugins(LightPlugin).add_systems(Startup, spawn_camera);
@@ -99,7 +99,7 @@ impl StudioPlugin {
             Some(name) => println!("no window: drawing to files on {name}"),
             None => println!("{HOW_TO_GET_PICTURES}"),
         }
-        // A software driver is no news here, and nor are cameras without a window.
+        // Warnings about a software driver, or cameras without a window, are of no use here.
         let render = if adapter.is_some() { "error" } else { "off" };
         let filter = format!("warn,bevy_render={render},bevy_light=error,bevy_gltf=error,wgpu=error");
         let log = LogPlugin { filter, ..default() };
@@ -113,7 +113,7 @@ impl StudioPlugin {
     }
 }
 
-/// Organs may lie anywhere, not only in an assets folder.
+/// Organs may be anywhere, not only in an assets folder.
 fn any_file() -> AssetPlugin {
     AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() }
 }
@@ -132,7 +132,7 @@ fn spawn_camera(
     let projection = Projection::from(PerspectiveProjection { near: 0.002, ..default() });
     let mut camera = commands.spawn((Camera3d::default(), IsDefaultUiCamera, projection, camera_lights(&mut images)));
     match target {
-        // Growing vessels are drawn small; the pictures use the whole target.
+        // Growing vessels are drawn small; pictures use the whole target.
         Some(target) => {
             let viewport = Viewport { physical_size: args.picture_size(), ..default() };
             let camera_to_image = Camera { viewport: Some(viewport), ..default() };
@@ -148,12 +148,12 @@ pub fn front_view() -> Viewpoint {
     Viewpoint { eye: Vec3::new(0.15, 0.12, 1.8), target: Vec3::ZERO, up: Vec3::Y }
 }
 
-/// Where a camera stands for a view.
+/// The transform of a camera for a view.
 pub fn transform_of(view: &Viewpoint) -> Transform {
     Transform::from_translation(view.eye).looking_at(view.target, view.up)
 }
 
-/// The transform that puts an organ, between two corners in any unit, at the origin and makes it one unit large.
+/// The transform that moves an organ, between two corners in any unit, to the origin and makes it one unit large.
 pub fn to_unit_size((low, high): (Vec3, Vec3)) -> Transform {
     let scale = 1.0 / (high - low).max_element().max(f32::MIN_POSITIVE);
     Transform::from_translation(-0.5 * (low + high) * scale).with_scale(Vec3::splat(scale))

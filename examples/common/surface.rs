@@ -1,4 +1,4 @@
-//! The surface of the organ that is operated on: what instruments touch and blood falls on, while it breathes.
+//! The surface of the operated organ, which instruments touch and blood falls on, while it breathes.
 
 use bevy::prelude::*;
 use bevy_vessels::{
@@ -6,10 +6,10 @@ use bevy_vessels::{
     synthesis::mesh::{SurfacePoint, TriangleIndex, TriangleMesh},
 };
 
-/// How far the diaphragm pushes the top of an organ, as a share of its height.
+/// Distance by which the diaphragm pushes the top of an organ, as a share of its height.
 const DEPTH: f32 = 0.02;
 
-/// An organ's surface in the world. It is known at rest; points of it move with the breath.
+/// An organ's surface in the world. It is stored at rest; its points move with the breath.
 #[derive(Resource)]
 pub struct Surface {
     mesh: TriangleMesh,
@@ -17,14 +17,14 @@ pub struct Surface {
     /// Lowest and highest point.
     low: f32,
     high: f32,
-    /// How far the chest is filled, from 0 to 1.
+    /// Filling of the chest, from 0 to 1.
     pub breath: f32,
-    /// From where the organ is looked at first.
+    /// Initial position of the viewer.
     pub eye: Vec3,
 }
 
 impl Surface {
-    /// The surface of a mesh at a place, looked at from somewhere.
+    /// The surface of a mesh at a place, seen from `eye`.
     pub fn new(mesh: &Mesh, place: &Transform, eye: Vec3) -> Result<Self> {
         let mesh = triangle_mesh(mesh)?;
         let positions = mesh.positions().iter().map(|&at| place.transform_point(at)).collect();
@@ -38,7 +38,7 @@ impl Surface {
         &self.mesh
     }
 
-    /// Where the breath moves a point of the organ: what is near the diaphragm goes down and to the front.
+    /// A point of the organ, moved by the breath: near the diaphragm it goes down and to the front.
     pub fn breathed(&self, at: Vec3) -> Vec3 {
         at + self.shift(at)
     }
@@ -49,16 +49,16 @@ impl Surface {
         DEPTH * height * self.breath * share * share * Vec3::new(0.0, -1.0, 0.6)
     }
 
-    /// Where a way first meets the surface, and the normal there.
+    /// The first point of the surface between two points, and its normal.
     pub fn hit(&self, from: Vec3, to: Vec3) -> Option<(Vec3, Vec3)> {
         let (touched, shift) = self.touch(from, to)?;
         Some((touched.position + shift, self.mesh.triangle_normal(touched.triangle)))
     }
 
-    /// What a way first meets, at rest, and how far that has moved.
+    /// The first point of the surface between two points, at rest, and its movement.
     pub fn touch(&self, from: Vec3, to: Vec3) -> Option<(SurfacePoint, Vec3)> {
         let mut shift = self.shift(to);
-        // The breath is the same for all that is near: where it was guessed for another place, once more is enough.
+        // The breath is the same for all nearby points, so one correction of the guess is enough.
         if let Some(first) = self.index.first_hit(from - shift, to - shift) {
             shift = self.shift(first.position);
         }
@@ -66,13 +66,13 @@ impl Surface {
         Some((touched, self.shift(touched.position)))
     }
 
-    /// The nearest point of the surface, and the normal there.
+    /// The nearest point of the surface, and its normal.
     pub fn nearest(&self, point: Vec3) -> Option<(Vec3, Vec3)> {
         let near = self.nearest_at_rest(point)?;
         Some((self.breathed(near.position), self.mesh.triangle_normal(near.triangle)))
     }
 
-    /// What of the surface at rest is nearest to a point.
+    /// The point of the surface at rest that is nearest to a point.
     pub fn nearest_at_rest(&self, point: Vec3) -> Option<SurfacePoint> {
         self.index.closest(point - self.shift(point))
     }

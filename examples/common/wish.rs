@@ -1,4 +1,4 @@
-//! Which organ, with which vessels, the command line asks for.
+//! The organ and vessels that the command line asks for.
 
 use crate::common::studio::StudioArgs;
 use bevy::prelude::*;
@@ -6,16 +6,16 @@ use bevy_vessels::{prelude::*, synthesis::organ::RootSites};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
-/// What examples with one organ understand.
+/// Arguments of examples with one organ.
 #[derive(Args, Clone, Debug)]
 pub struct OrganArgs {
-    /// How it is looked at.
+    /// Arguments of the studio.
     #[command(flatten)]
     pub studio: StudioArgs,
-    /// Take the organ in this glTF file instead of a procedural colon.
+    /// Use the organ in this glTF file instead of a procedural colon.
     #[arg(long)]
     pub mesh: Option<PathBuf>,
-    /// Which organ, where it is procedural, and which of the networks that the preset can give.
+    /// Seed of a procedural organ and of its network.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Name of a preset.
@@ -41,7 +41,7 @@ impl OrganArgs {
     /// Tint of organs that have no colours of their own.
     pub const FLESH: Color = Color::srgb(0.74, 0.42, 0.37);
 
-    /// The vessels, with their radii multiplied so that they show from afar, or are fine from near.
+    /// The vessels, with their radii multiplied so that they are visible from afar, or fine from near.
     pub fn vessels(&self, roots: Option<&RootSites>, radii: f32) -> Vasculature {
         let mut wish = Vasculature::new(self.preset).with_seed(self.seed);
         let settings = wish.generator.colonization_mut().expect("presets colonize");
@@ -60,7 +60,7 @@ impl OrganArgs {
         wish
     }
 
-    /// The tint of the organ: glass, where vessels grow inside.
+    /// The tint of the organ: glass if vessels grow inside.
     pub fn tint(&self, color: Color) -> Color {
         if self.mode == Mode::Surface { color } else { color.with_alpha(0.16) }
     }

@@ -12,7 +12,7 @@ use std::sync::mpsc;
 /// Parts of an organ that the progress bar shows.
 const PARTS: u64 = 1000;
 
-/// Grows organs 0 to `organs` − 1, of the seeds that `seed_of` gives them, and hands each line to `report`, in order.
+/// Grows organs 0 to `organs` − 1, with the seeds from `seed_of`, and passes each line to `report`, in order.
 ///
 /// Up to `threads` threads work. The first failure in order ends the batch; the organs before it are reported.
 pub fn grow_all(
@@ -26,7 +26,7 @@ pub fn grow_all(
     let workers = threads.min(usize::try_from(organs).unwrap_or(usize::MAX));
     let next = AtomicU64::new(0);
     let result = std::thread::scope(|scope| {
-        // Bounded, so that workers never run far ahead of a reader that is slow or has failed.
+        // Bounded, so that workers never run far ahead of a slow or failed reader.
         let (sender, receiver) = mpsc::sync_channel(workers);
         for _ in 0..workers {
             let (sender, next, seed_of, bar) = (sender.clone(), &next, &seed_of, &bar);
@@ -39,7 +39,7 @@ pub fn grow_all(
                             break;
                         }
                         let line = grower.grow(seed_of(organ), show_progress(bar));
-                        // Nobody listens any more once the batch has failed.
+                        // The receiver is gone once the batch has failed.
                         if sender.send((organ, line)).is_err() {
                             break;
                         }
@@ -56,7 +56,7 @@ pub fn grow_all(
     result
 }
 
-/// Hands on what arrives under the numbers 0, 1, 2 … in any order, in the order of the numbers, until one fails.
+/// Passes on items that arrive with the numbers 0, 1, 2 … in any order, in the order of the numbers, until one fails.
 fn in_order<T>(
     arriving: impl Iterator<Item = (u64, T)>,
     mut hand_on: impl FnMut(T) -> Result<(), Failure>,
@@ -78,18 +78,18 @@ fn in_order<T>(
 fn with_threads(threads: usize, work: impl FnOnce() + Send) {
     match rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build() {
         Ok(pool) => pool.install(work),
-        // No more threads to be had: the organs come out the same on this one.
+        // No more threads are available; the organs are the same on this one.
         Err(_) => work(),
     }
 }
 
-/// Runs the work of one organ on this thread, the only one that it can use.
+/// Runs the work of one organ on this thread, since it can use no other.
 #[cfg(not(feature = "parallel"))]
 fn with_threads(_threads: usize, work: impl FnOnce()) {
     work();
 }
 
-/// Moves the bar on by the share of one organ's steps that is done.
+/// Advances the bar by the share of one organ's steps that is done.
 fn show_progress(bar: &ProgressBar) -> impl FnMut(StepCount) {
     let mut shown = 0;
     move |steps| {
@@ -99,7 +99,7 @@ fn show_progress(bar: &ProgressBar) -> impl FnMut(StepCount) {
     }
 }
 
-/// A bar on standard error, drawn only where that is a terminal.
+/// A bar on standard error, drawn only if that is a terminal.
 fn progress_bar(parts: u64) -> ProgressBar {
     let bar = ProgressBar::new(parts);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} % {elapsed} + {eta} left") {

@@ -1,4 +1,4 @@
-//! The command's options, and its way from them to grown organs.
+//! The command's options, and the growth of organs from them.
 
 mod batch;
 mod edit;
@@ -28,13 +28,14 @@ pub struct Options {
     /// OBJ).
     #[arg(long, default_value = "disc", value_name = "disc|ball|box|FILE")]
     pub tissue: PathBuf,
-    /// Where on the mesh of an organ: over its surface, through its volume, or both in stages. Default: the preset's.
+    /// Where on an organ's mesh vessels grow: over its surface, through its volume, or both in stages. Default: the
+    /// preset's.
     #[arg(long)]
     pub mode: Option<Mode>,
     /// Built-in settings, by name.
     #[arg(long, default_value_t, conflicts_with = "settings", value_name = "NAME")]
     pub preset: PresetName,
-    /// A preset of your own, as a RON file.
+    /// Your own preset, as a RON file.
     #[arg(long, value_name = "FILE.ron")]
     pub settings: Option<PathBuf>,
     /// Changes one value of the preset, such as `arterial.direction_weight=0.9`. May be repeated.
@@ -46,13 +47,13 @@ pub struct Options {
     /// Samples drawn from the tissue in each step. Default: the preset's.
     #[arg(long)]
     pub samples: Option<u32>,
-    /// Multiplies every length of the settings, after they were fitted to the tissue.
+    /// Multiplies every length of the settings, after fitting them to the tissue.
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     pub lengths: f32,
     /// Grows arteries only.
     #[arg(long)]
     pub no_veins: bool,
-    /// Threads to work on; they share the organs, and what is left over the work within one. Default: all cores.
+    /// Number of threads. They share the organs; spare threads share the work on one organ. Default: all cores.
     #[arg(long)]
     pub threads: Option<NonZeroUsize>,
     /// Seed of the first organ.
@@ -61,10 +62,10 @@ pub struct Options {
     /// Number of organs, with seeds counting up.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     pub count: u64,
-    /// Part of the organs to grow, I of N from 0: those whose number divided by N leaves I.
+    /// Share of the organs to grow, I of N, counted from 0: those whose number modulo N is I.
     #[arg(long, value_name = "I/N", default_value = "0/1", value_parser = parse_shard)]
     pub shard: Shard,
-    /// Folder to write the vessels to; it is made if it is not there. Without it, nothing is written.
+    /// Folder for the vessels, created if missing. Without it, nothing is written.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Formats to write.
@@ -102,7 +103,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// The tissue's mode. Stages that the preset has stay as they are; otherwise half of all steps go to the surface.
+    /// The tissue's mode. Stages of the preset stay; otherwise half of all steps go to the surface.
     fn tissue_mode(self, preset: TissueMode, steps: u32) -> TissueMode {
         match (self, preset) {
             (Self::Surface, _) => TissueMode::Surface,
@@ -127,10 +128,10 @@ pub enum Format {
 /// Why the command stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// Options that cannot be meant.
+    /// Invalid options.
     #[error("{0}")]
     Usage(String),
-    /// Something went wrong on the way.
+    /// An error during the run.
     #[error("{0}")]
     Run(String),
 }
@@ -144,7 +145,7 @@ impl Failure {
         Self::Run(cause.to_string())
     }
 
-    /// 2 for wrong usage, as clap has it, 1 for the rest.
+    /// 2 for wrong usage, as in clap, 1 for the rest.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
@@ -165,7 +166,7 @@ struct Job {
     formats: Vec<Format>,
 }
 
-/// Grows the organs that the options ask for, and reports on `stdout` and in files.
+/// Grows the requested organs, and reports on `stdout` and in files.
 pub fn run(options: &Options, stdout: &mut impl Write) -> Result<(), Failure> {
     if options.seed.checked_add(options.count - 1).is_none() {
         return Err(Failure::usage("--seed plus --count is more than a seed can be, 2^64 − 1"));
@@ -245,7 +246,7 @@ fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue
         }
         (Some(shape), None) => preset.tissue = shape.into(),
         (None, mode) => {
-            // A file of settings may ask for a shape; the mesh on the command line goes before that.
+            // A mesh on the command line overrides a shape in a settings file.
             let mut tissue = match &preset.tissue {
                 TissueSource::Mesh(mesh) => mesh.clone(),
                 _ => MeshTissue::default(),

@@ -5,13 +5,13 @@ use ron::value::RawValue;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use std::fmt;
 
-/// Where a key is looked for when the preset itself does not have it, so that `steps=50` is enough.
+/// Field in which a key is looked up if the preset itself does not have it, so that `steps=50` is enough.
 const INNER: &str = "generator";
 
 /// The preset with one value changed.
 pub fn apply(preset: &Preset, change: &str) -> Result<Preset, String> {
     let (path, value) = change.split_once('=').ok_or("give it as key=value")?;
-    // Parsed on its own first, so that it cannot be more than one value.
+    // Parsed separately first, so that it cannot be more than one value.
     let value = RawValue::from_ron(value.trim()).map_err(|error| format!("not a RON value: {}", error.code))?;
     let text = preset.to_ron().map_err(|error| error.to_string())?;
     let mut keys: Vec<&str> = path.trim().split('.').collect();
@@ -20,13 +20,13 @@ pub fn apply(preset: &Preset, change: &str) -> Result<Preset, String> {
     }
     let (text, before) = replace(&text, &keys, value.get_ron(), None)?;
     Preset::from_ron(&text).map_err(|error| match error {
-        // The parser's words and position are of a text that the user never saw.
+        // The parser's message and position refer to a text that the user never saw.
         PresetError::Syntax(_) => format!("it cannot have this value; now it is {}", shortened(&before)),
         other => other.to_string(),
     })
 }
 
-/// RON on one line, cut off where it gets long.
+/// RON on one line, cut off if it is long.
 fn shortened(text: &str) -> String {
     const SHOWN: usize = 60;
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -34,7 +34,7 @@ fn shortened(text: &str) -> String {
     if shown.len() < line.len() { shown + " …" } else { line }
 }
 
-/// RON of a struct, or of a variant that holds one, with the value at a path replaced; and the value that was there.
+/// RON of a struct, or of a variant that holds one, with the value at a path replaced, and the old value.
 fn replace(text: &str, path: &[&str], value: &str, within: Option<&str>) -> Result<(String, String), String> {
     let [key, rest @ ..] = path else {
         return Ok((value.to_owned(), text.to_owned()));
@@ -51,7 +51,7 @@ fn replace(text: &str, path: &[&str], value: &str, within: Option<&str>) -> Resu
     Ok((format!("{}({}){}", variant.before, fields.join(", "), variant.after), before))
 }
 
-/// RON of a struct, and what stands around it where it is held by a variant of an enum.
+/// RON of a struct, and the text around it if an enum variant holds it.
 struct Variant<'a> {
     before: &'a str,
     held: &'a str,
@@ -59,7 +59,7 @@ struct Variant<'a> {
 }
 
 impl<'a> Variant<'a> {
-    /// Looks into `Name((field: …))` and `Name(field: …)`. Anything else is itself what is held.
+    /// Looks into `Name((field: …))` and `Name(field: …)`. Any other text is the held value itself.
     fn of(text: &'a str) -> Self {
         let name = text.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(0);
         let (name, held) = text.split_at(name);
@@ -74,7 +74,7 @@ impl<'a> Variant<'a> {
     }
 }
 
-/// Names and RON of a struct's fields, whatever the struct.
+/// Names and RON of any struct's fields.
 struct Fields(Vec<(String, String)>);
 
 impl Fields {

@@ -55,7 +55,7 @@ impl<'a> Grower<'a> {
     }
 }
 
-/// Writes the vessels as they are drawn, and gives the files' paths.
+/// Writes the vessels as drawn, and returns the files' paths.
 fn write_files(job: &Job, growth: &dyn Growth, seed: u64, hash: u64) -> Result<Vec<String>, Failure> {
     let Some(folder) = &job.out else {
         return Ok(Vec::new());
@@ -88,7 +88,7 @@ fn write_files(job: &Job, growth: &dyn Growth, seed: u64, hash: u64) -> Result<V
     Ok(files)
 }
 
-/// What it takes to grow a file's vessels again.
+/// Header comments with all that is needed to grow a file's vessels again.
 fn comments(job: &Job, kind: VesselKind, seed: u64, hash: u64) -> Vec<String> {
     vec![
         format!("{} vessels of {}, preset {}, seed {seed}", kind.name(), job.tissue_name, job.preset_name),
@@ -102,7 +102,7 @@ fn tissue_stem(job: &Job) -> String {
     path.file_stem().map_or_else(|| job.tissue_name.clone(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// A name with nothing in it that a file system or a shell could take amiss.
+/// A name without characters that are special to a file system or a shell.
 fn file_name(name: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '.';
     name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect()

@@ -1,4 +1,4 @@
-//! What is reported of an organ.
+//! The report of an organ.
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
@@ -17,7 +17,7 @@ const COVERAGE_SAMPLES: usize = 20_000;
 pub struct Line {
     /// The option `--tissue`.
     pub tissue: String,
-    /// Name of the preset, or of the file of settings without its ending.
+    /// Name of the preset, or of the settings file without its extension.
     pub preset: String,
     /// The organ's seed.
     pub seed: u64,
@@ -30,14 +30,14 @@ pub struct Line {
     /// Each kind of vessels, under its name: `arterial`, `venous`, `portal`, `ductal`.
     #[serde(flatten)]
     pub kinds: KindMeasures,
-    /// Files that were written.
+    /// Written files.
     pub files: Vec<String>,
 }
 
 impl Line {
     /// The line of `--json`.
     pub fn json(&self) -> String {
-        // Fails only on maps with keys that are no strings, of which there are none.
+        // Fails only on maps with keys that are not strings, and there are none.
         serde_json::to_string(self).unwrap_or_default()
     }
 
@@ -72,7 +72,7 @@ impl Serialize for KindMeasures {
     }
 }
 
-/// Statistics of the centre lines of one kind. What a tree does not have is null.
+/// Statistics of the centre lines of one kind. Values that a tree does not have are null.
 #[derive(Debug, Serialize)]
 pub struct Measures {
     nodes: usize,

@@ -1,4 +1,4 @@
-//! How the app hears of what happens to vessels: as messages, and as events that observers hear.
+//! Tells the app what happens to vessels, both as messages and as events for observers.
 
 use bevy::ecs::{
     event::{EntityEvent, EntityTrigger, Event},
@@ -6,10 +6,10 @@ use bevy::ecs::{
     system::{Commands, SystemParam},
 };
 
-/// Says what happened, in both ways at once, so that no place forgets one of them.
+/// Announces something as a message and as an event, so that no caller forgets one of them.
 ///
-/// The message can be read at once. The event is triggered when the commands of the system that announces it are applied:
-/// in the same frame, before the next system that is ordered after it.
+/// The message can be read at once. The event is triggered when the announcing system's commands are applied: in the
+/// same frame, before the next system that is ordered after it.
 #[derive(SystemParam)]
 pub(crate) struct Announcer<'w, 's, M: Message> {
     messages: MessageWriter<'w, M>,

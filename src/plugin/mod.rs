@@ -1,14 +1,14 @@
-//! ECS glue: vessels grow on organ entities, frame by frame, and can be cut, bleed and follow their organ. No drawing.
+//! ECS glue: vessels grow on organ entities, frame by frame. They can be cut, bleed, and follow their organ. No
+//! drawing.
 //!
-//! In: an entity with a `Mesh3d` and a [`Vasculature`]. Out: a vessel entity for each kind of vessels, child of the organ,
-//! with the tree in [`Vessels`] and what changed in [`ChangeLog`]; the state of things in [`GrowthProgress`] and
-//! messages.
+//! In: an entity with a `Mesh3d` and a [`Vasculature`]. Out: a vessel entity for each kind of vessels, child of the
+//! organ, with the tree in [`Vessels`] and its changes in [`ChangeLog`]; progress in [`GrowthProgress`] and messages.
 //!
-//! What goes beyond growth is asked for by components on the organ: [`Cuttable`] for surgery through [`CuttableVessels`],
-//! [`Perfusion`] for blood, [`FollowsMesh`] or [`FollowsTetrahedra`] for soft bodies. An organ without them pays nothing
-//! for them.
+//! Components on the organ add features beyond growth: [`Cuttable`] for surgery through [`CuttableVessels`],
+//! [`Perfusion`] for blood, [`FollowsMesh`] or [`FollowsTetrahedra`] for soft bodies. An organ without them has no cost
+//! from them.
 //!
-//! Each room has a plugin of its own, and may be added alone:
+//! Each room has a plugin of its own, which may be added alone:
 //!
 //! | plugin | room | what its systems do, in the order of a frame |
 //! |---|---|---|
@@ -16,14 +16,15 @@
 //! | [`DeformationPlugin`] | `deformation` | deformed organs → moved [`Vessels`] |
 //! | [`SurgeryPlugin`] | `surgery` | [`CuttableVessels`], [`VesselCommand`]s → [`VesselWounds`], [`OpenEnd`] entities |
 //! | [`CirculationPlugin`] | `circulation` | [`VesselWounds`] → flow, bleeding, supply of the tissue |
-//! | [`ScenePlugin`] | `scene` | [`PresetAsset`]s → [`Vasculature`]; what is kept of an organ that is saved |
-//! | [`VesselsPlugin`] | `vessels` | what all of them need; they add it themselves |
+//! | [`ScenePlugin`] | `scene` | [`PresetAsset`]s → [`Vasculature`]; organs saved in scenes |
+//! | [`VesselsPlugin`] | `vessels` | what all the others need; they add it themselves |
 
 mod announcer;
 mod circulation;
 mod deformation;
 mod growth;
 mod job;
+mod lineage;
 mod order;
 mod organ;
 mod scene;

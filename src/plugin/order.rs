@@ -1,4 +1,4 @@
-//! In which order things happen to vessels in a frame: once, here.
+//! The order in which things happen to vessels in a frame, defined only here.
 
 use bevy::{
     app::App,
@@ -10,9 +10,9 @@ use bevy::{
     mesh::Mesh,
 };
 
-/// What happens to vessels in a frame, in this order.
+/// The systems that run on vessels in a frame, in this order.
 ///
-/// Each room reads what the rooms before it wrote, so that nothing has to be done twice.
+/// Each set reads what the sets before it wrote, so that nothing has to be done twice.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VesselSystems {
     /// Changed meshes and settings become tissues; growths start.
@@ -24,13 +24,14 @@ pub enum VesselSystems {
     /// Vessels follow organs that were deformed before this.
     Follow,
     /// Vessels are cut, clamped, sealed and healed, as [`CuttableVessels`](crate::plugin::CuttableVessels) and
-    /// [`VesselCommand`](crate::plugin::VesselCommand)s ask. Ask before this, and what you ask for is done in the same frame.
+    /// [`VesselCommand`](crate::plugin::VesselCommand)s ask. Requests made before this set are carried out in the same
+    /// frame.
     Cut,
     /// Blood flows, and is lost.
     Circulate,
 }
 
-/// Puts the sets of a schedule in their order. Every plugin of a room calls this; once is as good as often.
+/// Puts the sets of a schedule in their order. The plugin of every room calls this; repeated calls change nothing.
 pub(crate) fn configure(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
     app.configure_sets(
         schedule,

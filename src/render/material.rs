@@ -1,4 +1,4 @@
-//! What segments are made of: Bevy's standard material, with a vertex stage that pulls segments from a buffer.
+//! The material of segments: Bevy's standard material, with a vertex stage that pulls segments from a buffer.
 
 use super::template::{ATTRIBUTE_DETAIL, ATTRIBUTE_SECOND_GOAL, ATTRIBUTE_THIRD_GOAL};
 use crate::synthesis::tree::{ByKind, VesselKind};
@@ -54,7 +54,7 @@ impl MaterialExtension for SegmentExtension {
         layout: &MeshVertexBufferLayoutRef,
         _key: MaterialExtensionKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
-        // one set of inputs for all passes, which otherwise number their attributes differently
+        // one set of inputs for all passes, which otherwise number attributes differently
         descriptor.vertex.buffers = vec![layout.0.get_layout(&[
             Mesh::ATTRIBUTE_POSITION.at_shader_location(0),
             Mesh::ATTRIBUTE_UV_0.at_shader_location(1),
@@ -63,7 +63,7 @@ impl MaterialExtension for SegmentExtension {
             ATTRIBUTE_SECOND_GOAL.at_shader_location(4),
             ATTRIBUTE_THIRD_GOAL.at_shader_location(5),
         ])?];
-        // the colour comes out of our vertex stage although the mesh has no such attribute
+        // our vertex stage outputs a colour, although the mesh has no such attribute
         descriptor.vertex.shader_defs.push("VERTEX_COLORS".into());
         if let Some(fragment) = &mut descriptor.fragment {
             fragment.shader_defs.push("VERTEX_COLORS".into());
@@ -72,7 +72,7 @@ impl MaterialExtension for SegmentExtension {
     }
 }
 
-/// The materials that new vessel entities start from.
+/// The initial materials of new vessel entities.
 ///
 /// Change this resource before vessels appear, or the material of one vessel entity at any time: see
 /// [`SegmentMaterial`]. Base colours multiply the colours of the segments, so they stay white unless a tint is wanted.

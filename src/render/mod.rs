@@ -1,23 +1,22 @@
 //! Drawing: vessels as instanced segments, lit by Bevy's own materials.
 //!
-//! In: [`Vessels`](crate::plugin::Vessels) and the chunks of them that [`ChangeLog`](crate::plugin::ChangeLog)
-//! marks. Out: a picture, with shadows, prepasses and multisampling.
+//! In: [`Vessels`](crate::plugin::Vessels) and the changes that [`ChangeLog`](crate::plugin::ChangeLog) marks. Out: a
+//! picture, with shadows, prepasses and multisampling.
 //!
 //! A vessel entity, however large, is a handful of chunk entities that share a few meshes: many copies of a template cone
 //! with round ends. The vertex stage looks up each copy's end points and radii in a storage buffer and shapes it there.
-//! Growth rewrites only the slots that changed; with nothing changed, nothing happens. Severed segments show what is left of
-//! them, see `stumps`, with a view into the lumen. Chunks are children of the vessel
-//! entity, which is a child of the organ: transforms, visibility and despawning follow the hierarchy. Each chunk has its own
-//! bounding box, so parts outside the view are not drawn; and each has the level of detail that its size in the picture asks
-//! for.
+//! Growth rewrites only the slots that changed; without a change nothing happens. Severed segments show their remaining
+//! pieces (see `stumps`), with a view into the lumen. Chunks are children of the vessel entity, which is a child of the
+//! organ: transforms, visibility and despawning follow the hierarchy. Each chunk has its own bounding box, so that
+//! parts outside the view are not drawn, and the level of detail for its size in the picture.
 //!
-//! A chunk has up to 4096 segments, which makes an idle frame of a million segments cheap for the CPU: what Bevy does for
-//! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often: vessels
-//! grow everywhere at once, so 256 segments that follow one another reach over three quarters of an organ already.
+//! A chunk has up to 4096 segments, which makes an idle frame of a million segments cheap for the CPU: Bevy's work for
+//! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often:
+//! vessels grow everywhere at once, so even 256 consecutive segments reach over three quarters of an organ.
 //!
-//! Without a GPU, or with one that lacks storage buffers (WebGL 2), nothing is drawn and growth goes on: one warning says so.
+//! Without a GPU, or with one that lacks storage buffers (WebGL 2), nothing is drawn and growth goes on, with one
+//! warning.
 
-use crate::synthesis::instances::SegmentInstance;
 use bevy::{
     asset::{AssetEventSystems, embedded_asset},
     camera::{CameraUpdateSystems, visibility::VisibilitySystems},
@@ -27,23 +26,31 @@ use bevy::{
         ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems,
         erased_render_asset::prepare_erased_assets,
         render_asset::prepare_assets,
-        render_resource::{DownlevelFlags, WgpuLimits},
         renderer::{RenderAdapter, RenderDevice},
         storage::GpuShaderBuffer,
     },
 };
 
+mod buffer;
+mod chunk;
 mod detail;
+mod levels;
+mod limits;
 mod material;
 mod segments;
 mod stumps;
 mod template;
 mod upload;
 
+pub use buffer::SegmentBuffer;
+pub use chunk::SegmentChunk;
+pub use limits::SegmentLimits;
 pub use material::{SegmentExtension, SegmentMaterial, VesselMaterials};
-pub use segments::{SegmentBuffer, SegmentChunk};
 
-use detail::{ChunkMeshes, Detail, FEWEST_SLOTS, Shape, choose_detail};
+use buffer::{attach_buffers, detach_buffer};
+use detail::{ChunkMeshes, choose_detail};
+use levels::{Detail, Shape};
+use segments::update_segments;
 use upload::{SegmentWrites, extract_writes, queue_scatter_pipeline, write_segments_to_gpu};
 
 /// Draws the segments of all vessel entities.
@@ -54,7 +61,7 @@ use upload::{SegmentWrites, extract_writes, queue_scatter_pipeline, write_segmen
 pub struct SegmentRenderPlugin {
     /// Corners of a vessel's cross-section.
     ///
-    /// More are rounder and slower: 6 suits millions of thin segments, 16 a close look.
+    /// More are rounder and slower: 6 suits millions of thin segments, 16 suits close views.
     ///
     /// Limits: 3 to 64, clamped. Default: [`Self::DEFAULT_SIDES`].
     pub sides: u32,
@@ -64,18 +71,18 @@ pub struct SegmentRenderPlugin {
     ///
     /// Limits: 0 to 16, clamped. Default: [`Self::DEFAULT_CAP_RINGS`].
     pub cap_rings: u32,
-    /// How far the outline of a segment may be from that of its true shape before it gets fewer corners.
+    /// Largest error of a segment's outline that drawing it with fewer corners may cause.
     ///
-    /// Higher values draw distant vessels faster, and more angular. 0 keeps all corners at any distance.
+    /// Higher values draw distant vessels faster and more angular. 0 keeps all corners at any distance.
     ///
     /// Units: pixels. Limits: 0 to 2, clamped. Default: [`Self::DEFAULT_TOLERANCE`].
     pub tolerance: f32,
-    /// Width below which segments drop out. The fewer are left, the wider they are drawn, so that vessels keep the part of
-    /// the picture that they cover, don't sparkle, and an organ far away costs little.
+    /// Width below which segments drop out. The fewer are left, the wider they are drawn, so that vessels cover the
+    /// same area and don't sparkle. A distant organ costs little.
     ///
-    /// Higher values are faster, and turn thin vessels into dots sooner. Half a pixel suits 4× multisampling, which shows
-    /// what is so thin as a continuous line; without multisampling, 1 keeps distant vessels from sparkling. At 0 every
-    /// segment is drawn, however small, and is seen or not as chance will have it.
+    /// Higher values are faster, and turn thin vessels into dots sooner. Half a pixel suits 4× multisampling, which
+    /// shows such thin vessels as continuous lines; without multisampling, 1 keeps distant vessels from sparkling. At 0
+    /// every segment is drawn, however small, and chance decides whether it is visible.
     ///
     /// Units: pixels. Limits: 0 to 2, clamped. Default: [`Self::DEFAULT_LEAST_WIDTH`].
     pub least_width: f32,
@@ -121,7 +128,7 @@ impl Plugin for SegmentRenderPlugin {
             .insert_resource(ChunkMeshes::new(&self.detail()))
             .init_resource::<VesselMaterials>()
             .init_resource::<SegmentWrites>()
-            .add_observer(segments::detach_buffer)
+            .add_observer(detach_buffer)
             .configure_sets(
                 PostUpdate,
                 SegmentSystems
@@ -132,7 +139,7 @@ impl Plugin for SegmentRenderPlugin {
             .add_systems(
                 PostUpdate,
                 (
-                    (segments::attach_buffers, segments::update_segments).chain().in_set(SegmentSystems),
+                    (attach_buffers, update_segments).chain().in_set(SegmentSystems),
                     choose_detail
                         .after(TransformSystems::Propagate)
                         .after(CameraUpdateSystems)
@@ -171,8 +178,8 @@ fn build_render_app(app: &mut App) {
         .add_systems(ExtractSchedule, extract_writes)
         .add_systems(
             Render,
-            // Bevy doesn't order materials after the buffers that they bind: one that grew must be there first, or its
-            // material would go on drawing from the old one
+            // Bevy doesn't order materials after the buffers that they bind: a buffer that grew must be ready first, or
+            // its material would go on drawing from the old one
             write_segments_to_gpu
                 .in_set(RenderSystems::PrepareAssets)
                 .after(prepare_assets::<GpuShaderBuffer>)
@@ -180,66 +187,13 @@ fn build_render_app(app: &mut App) {
         );
 }
 
-/// The systems that bring drawn segments up to date, in `PostUpdate`, before transforms are propagated.
+/// The systems that update drawn segments, in `PostUpdate`, before transforms are propagated.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SegmentSystems;
-
-/// What the GPU can take. Present only where segments are drawn.
-#[derive(Resource, Clone, Copy, Debug, Reflect)]
-#[reflect(Resource, Clone, Debug)]
-pub struct SegmentLimits {
-    max_segments: usize,
-    segments_per_chunk: usize,
-}
-
-impl SegmentLimits {
-    /// `None` when the vertex stage can't read storage buffers, or compute shaders can't write them.
-    fn new(limits: &WgpuLimits, flags: DownlevelFlags, segments_per_chunk: usize) -> Option<Self> {
-        let needed = DownlevelFlags::VERTEX_STORAGE | DownlevelFlags::COMPUTE_SHADERS;
-        if !flags.contains(needed) || limits.max_storage_buffers_per_shader_stage == 0 {
-            return None;
-        }
-        let bytes = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
-        // mesh tags and node indices are 32-bit
-        let segments = (bytes / SegmentInstance::SIZE as u64).min(1 << 31) as usize;
-        let max_segments = segments - segments % segments_per_chunk;
-        (max_segments >= FEWEST_SLOTS).then_some(Self { max_segments, segments_per_chunk })
-    }
-
-    /// Segments of one vessel entity that can be drawn: those that fit in a storage buffer.
-    pub fn max_segments(&self) -> usize {
-        self.max_segments
-    }
-
-    /// Segments that one chunk entity draws at most: fewer where their template is very round.
-    pub fn segments_per_chunk(&self) -> usize {
-        self.segments_per_chunk
-    }
-}
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const CHUNK: usize = 4096;
-
-    #[test]
-    fn limits_are_whole_chunks_that_fit_in_a_buffer() {
-        let device = WgpuLimits { max_storage_buffer_binding_size: 1 << 20, max_buffer_size: 1 << 30, ..default() };
-        let limits = SegmentLimits::new(&device, DownlevelFlags::all(), CHUNK).unwrap();
-        assert_eq!(limits.max_segments() % CHUNK, 0);
-        let bytes = limits.max_segments() * SegmentInstance::SIZE;
-        assert!(bytes <= 1 << 20 && bytes > (1 << 20) - CHUNK * SegmentInstance::SIZE);
-    }
-
-    #[test]
-    fn devices_that_lack_something_draw_nothing() {
-        for lacking in [DownlevelFlags::VERTEX_STORAGE, DownlevelFlags::COMPUTE_SHADERS] {
-            assert!(SegmentLimits::new(&WgpuLimits::default(), DownlevelFlags::all() - lacking, CHUNK).is_none());
-        }
-        let none = WgpuLimits::downlevel_webgl2_defaults();
-        assert!(SegmentLimits::new(&none, DownlevelFlags::all(), CHUNK).is_none());
-    }
 
     #[test]
     fn settings_outside_their_limits_are_clamped() {

@@ -1,6 +1,6 @@
-// Puts segments where they belong: one invocation per segment.
+// Writes segments to their slots: one invocation per segment.
 
-// `SegmentInstance` of `synthesis::instances`, of which only the size matters here
+// `SegmentInstance` of `synthesis::instances`: only its size matters here
 struct Segment {
     words: array<vec4<f32>, 3>,
 }

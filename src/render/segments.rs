@@ -1,215 +1,35 @@
 //! Keeps the chunks of every vessel entity, their boxes and their buffer up to date with its tree.
 
 use super::{
-    SegmentLimits,
-    detail::{ChunkMeshes, FEWEST_SLOTS},
-    material::{SegmentExtension, SegmentMaterial, VesselMaterials},
-    stumps::Stumps,
+    buffer::{Look, SegmentBuffer},
+    chunk::{ChunkContents, SegmentChunk},
+    detail::ChunkMeshes,
+    levels::FEWEST_SLOTS,
+    limits::SegmentLimits,
+    material::SegmentMaterial,
     upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
-    plugin::{
-        ChangeCursor, ChangeLog, Changes, SegmentColoring, SegmentSupply, VesselAppearance, VesselWounds, Vessels,
-        VesselsOf,
-    },
-    synthesis::{
-        instances::{SegmentColors, SegmentInstance, segment_instance},
-        tree::VesselKind,
-    },
+    plugin::{ChangeLog, Changes, SegmentSupply, VesselAppearance, VesselWounds, Vessels, VesselsOf},
+    synthesis::instances::{SegmentInstance, segment_instance},
 };
 use bevy::{
-    asset::RenderAssetUsages,
     camera::{primitives::Aabb, visibility::NoAutoAabb},
     ecs::{query::QueryData, system::SystemParam},
-    math::bounding::{Aabb3d, BoundingVolume},
     mesh::MeshTag,
     prelude::*,
     render::storage::ShaderBuffer,
 };
 
-/// What is drawn of a vessel entity: its buffer of segments, its material and its chunks.
-///
-/// Added to entities with [`Vessels`] and removed with them.
-#[derive(Component, Debug)]
-pub struct SegmentBuffer {
-    pub(super) buffer: Handle<ShaderBuffer>,
-    material: Handle<SegmentMaterial>,
-    /// The changes that have been drawn.
-    drawn: ChangeCursor,
-    /// Segments that the buffer has room for.
-    capacity: usize,
-    /// Slots that may hold something else than hidden segments.
-    written: usize,
-    /// Chunk entities, in the order of their slots.
-    chunks: Vec<Entity>,
-    /// What is in each chunk.
-    contents: Vec<ChunkContents>,
-    colors: SegmentColors,
-    /// The appearance that `colors` follow, `None` at first.
-    look: Option<Look>,
-    warned_of_limit: bool,
-    /// What severed segments show.
-    pub(super) stumps: Stumps,
-    /// Slots that the buffer has for stumps, behind those of the nodes.
-    room: usize,
-}
-
-impl SegmentBuffer {
-    /// Material of all chunks of this vessel entity.
-    pub fn material(&self) -> &Handle<SegmentMaterial> {
-        &self.material
-    }
-
-    /// The buffer that holds this vessel entity's segments, one
-    /// [`SegmentInstance`](crate::synthesis::instances::SegmentInstance) per node, for materials and compute shaders of
-    /// your own. From [`capacity`](Self::capacity) on follow the pieces of severed segments beside the first of each, in no
-    /// order. It is on the GPU only, and moves when it grows: ask again after the handle's asset was modified.
-    pub fn buffer(&self) -> &Handle<ShaderBuffer> {
-        &self.buffer
-    }
-
-    /// The entities that draw, children of the vessel entity; each has a mesh tag, its first node, and a bounding box.
-    pub fn chunks(&self) -> &[Entity] {
-        &self.chunks
-    }
-
-    /// The entities that draw the further pieces of severed segments, children of the vessel entity.
-    pub fn stump_chunks(&self) -> &[Entity] {
-        self.stumps.chunks()
-    }
-
-    /// Nodes' segments that fit before the buffer has to grow.
-    pub fn capacity(&self) -> usize {
-        self.capacity
-    }
-}
-
-/// An entity that draws one chunk of segments. For reading: its mesh follows its size in the picture.
-#[derive(Component, Clone, Debug, Reflect)]
-#[reflect(Component, Clone, Debug)]
-pub struct SegmentChunk {
-    /// Radius of the thickest segment, in the local space of the vessel entity.
-    pub(super) thickest: f32,
-    /// Slots that its mesh must have.
-    pub(super) slots: usize,
-    /// Its level of detail.
-    pub(super) level: usize,
-    /// Level and slots of the mesh that it has.
-    pub(super) drawn: (usize, usize),
-}
-
-impl SegmentChunk {
-    /// Level of detail, 0 for the finest. Each further one has fewer corners, or fewer segments.
-    pub fn level(&self) -> usize {
-        self.level
-    }
-}
-
-/// What a chunk's box and thickness follow from.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct ChunkContents {
-    bounds: Option<Aabb3d>,
-    thickest: f32,
-}
-
-impl ChunkContents {
-    /// Takes in segments. While vessels grow, what they were before lies within what they are now.
-    pub(super) fn add<'a>(&mut self, segments: impl IntoIterator<Item = &'a SegmentInstance>) {
-        for segment in segments.into_iter().filter(|segment| segment.is_visible()) {
-            let own = segment.bounds();
-            self.bounds = Some(self.bounds.map_or(own, |all| all.merge(&own)));
-            self.thickest = segment.radii().into_iter().fold(self.thickest, f32::max);
-        }
-    }
-}
-
-/// What decides the colours.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Look {
-    Uniform([f32; 3]),
-    Supply([f32; 3]),
-    Ramp(SegmentColoring),
-}
-
-impl Look {
-    fn new(appearance: &VesselAppearance, kind: VesselKind) -> Self {
-        let own = appearance.colors[kind].to_linear().to_f32_array_no_alpha();
-        match appearance.coloring {
-            SegmentColoring::Kind => Self::Uniform(own),
-            SegmentColoring::Supply => Self::Supply(own),
-            ramp => Self::Ramp(ramp),
-        }
-    }
-
-    fn colors(self) -> SegmentColors {
-        match self {
-            Self::Uniform(color) => SegmentColors::Uniform(color),
-            Self::Supply(full) => SegmentColors::Supply { full, levels: Vec::new() },
-            Self::Ramp(SegmentColoring::Kind | SegmentColoring::Supply) => SegmentColors::Uniform([1.0; 3]),
-            Self::Ramp(SegmentColoring::Radius) => SegmentColors::RADIUS,
-            Self::Ramp(SegmentColoring::Age) => SegmentColors::AGE,
-            Self::Ramp(SegmentColoring::StrahlerOrder) => SegmentColors::STRAHLER,
-        }
-    }
-}
-
-/// Gives every new vessel entity an empty buffer and a material.
-pub(super) fn attach_buffers(
-    mut commands: Commands,
-    new: Query<(Entity, &Vessels, Option<&Children>), Without<SegmentBuffer>>,
-    chunks: Query<(), With<SegmentChunk>>,
-    templates: Res<VesselMaterials>,
-    mut buffers: ResMut<Assets<ShaderBuffer>>,
-    mut materials: ResMut<Assets<SegmentMaterial>>,
-) {
-    for (entity, vessels, children) in &new {
-        // Those that came with a scene or a clone draw nothing.
-        for &stray in children.into_iter().flatten().filter(|&&child| chunks.contains(child)) {
-            commands.entity(stray).try_despawn();
-        }
-        let (capacity, stumps) = (FEWEST_SLOTS, Stumps::default());
-        let bytes = (capacity + stumps.room()) * SegmentInstance::SIZE;
-        let mut buffer = ShaderBuffer::with_size(bytes, RenderAssetUsages::default());
-        buffer.buffer_description.label = Some("vessel segments");
-        let buffer = buffers.add(buffer);
-        let extension = SegmentExtension { segments: buffer.clone() };
-        let material = materials.add(SegmentMaterial { base: templates.0[vessels.kind()].clone(), extension });
-        commands.entity(entity).insert(SegmentBuffer {
-            buffer,
-            material,
-            drawn: ChangeCursor::default(),
-            capacity,
-            written: 0,
-            chunks: Vec::new(),
-            contents: Vec::new(),
-            colors: SegmentColors::Uniform([1.0; 3]),
-            look: None,
-            warned_of_limit: false,
-            room: stumps.room(),
-            stumps,
-        });
-    }
-}
-
-/// Removes what was drawn of an entity that lost its vessels but lives on.
-pub(super) fn detach_buffer(removed: On<Remove, Vessels>, mut commands: Commands, buffers: Query<&SegmentBuffer>) {
-    if let Ok(buffer) = buffers.get(removed.entity) {
-        for &chunk in buffer.chunks.iter().chain(buffer.stump_chunks()) {
-            commands.entity(chunk).try_despawn();
-        }
-        commands.entity(removed.entity).try_remove::<SegmentBuffer>();
-    }
-}
-
 /// Everything that drawing segments writes to.
 #[derive(SystemParam)]
 pub(super) struct SegmentStore<'w, 's> {
-    pub(super) commands: Commands<'w, 's>,
+    commands: Commands<'w, 's>,
     drawn: Query<'w, 's, (&'static mut Aabb, &'static mut SegmentChunk)>,
     buffers: ResMut<'w, Assets<ShaderBuffer>>,
     materials: ResMut<'w, Assets<SegmentMaterial>>,
     meshes: ResMut<'w, Assets<Mesh>>,
-    pub(super) writes: ResMut<'w, SegmentWrites>,
+    writes: ResMut<'w, SegmentWrites>,
     templates: ResMut<'w, ChunkMeshes>,
     limits: Res<'w, SegmentLimits>,
 }
@@ -227,7 +47,7 @@ pub(super) struct DrawnVessels {
     segments: &'static mut SegmentBuffer,
 }
 
-/// Brings buffers, boxes and chunks up to date with trees and colours that changed.
+/// Updates buffers, boxes and chunks from changed trees and colours.
 pub(super) fn update_segments(
     mut drawn: Query<DrawnVessels>,
     appearances: Query<Ref<VesselAppearance>>,
@@ -235,7 +55,7 @@ pub(super) fn update_segments(
 ) {
     for mut drawn in &mut drawn {
         let appearance = appearances.get(drawn.organ.0).ok();
-        let restyled = drawn.segments.look.is_none() || appearance.as_ref().is_some_and(Ref::is_changed);
+        let restyled = !drawn.segments.has_look() || appearance.as_ref().is_some_and(Ref::is_changed);
         let blanched = drawn.segments.follows_supply() && drawn.supply.as_ref().is_some_and(Ref::is_changed);
         if drawn.segments.drawn.is_current(drawn.log) && !restyled && !blanched {
             continue;
@@ -260,32 +80,8 @@ pub(super) fn update_segments(
     }
 }
 
-impl SegmentBuffer {
-    /// Whether colours tell the supply.
-    fn follows_supply(&self) -> bool {
-        matches!(self.look, Some(Look::Supply(_)))
-    }
-
-    /// Adopts look and supply, and adds the segments that have another colour now.
-    fn adopt(&mut self, look: Look, vessels: &Vessels, supply: &[f32], changes: &mut Changes) {
-        let (tree, births) = (vessels.tree(), vessels.birth_steps());
-        if self.look != Some(look) {
-            self.look = Some(look);
-            self.colors = look.colors();
-            self.colors.refresh(tree, births, [0..tree.len()]);
-            self.colors.set_supply(supply);
-            changes.add_all();
-            return;
-        }
-        let recolored = self.colors.refresh(tree, births, changes.dirty_ranges(tree.len()));
-        for recolored in recolored.into_iter().chain(self.colors.set_supply(supply)) {
-            recolored.for_each(|node| changes.add(node));
-        }
-    }
-}
-
 impl SegmentStore<'_, '_> {
-    /// How many of `len` nodes can be drawn beside the stumps; says so once when those are not all.
+    /// Number of `len` nodes that can be drawn beside the stumps; warns once if not all can.
     fn drawable(&self, entity: Entity, len: usize, segments: &mut SegmentBuffer) -> usize {
         let stumps = segments.stumps.room();
         let most = self.limits.max_segments().saturating_sub(stumps);
@@ -309,7 +105,7 @@ impl SegmentStore<'_, '_> {
             if let Some(mut buffer) = self.buffers.get_mut(&segments.buffer) {
                 buffer.resize_in_place(((segments.capacity + room) * SegmentInstance::SIZE) as u64);
             }
-            // a mutable look at the material makes its bind group anew, with the larger buffer
+            // mutable access to the material makes its bind group again, with the larger buffer
             if let Some(mut material) = self.materials.get_mut(&segments.material) {
                 material.extension.segments = segments.buffer.clone();
             }
@@ -322,7 +118,7 @@ impl SegmentStore<'_, '_> {
         }
     }
 
-    /// Queues the segments that changed, and takes them into their chunks.
+    /// Queues the segments that changed, and adds them to their chunks.
     fn write(&mut self, vessels: &Vessels, changes: &Changes, segments: &mut SegmentBuffer, len: usize) {
         let slots = self.templates.slots();
         if changes.is_all() {
@@ -341,13 +137,13 @@ impl SegmentStore<'_, '_> {
             segments.stumps.replace(nodes, out);
             contents.add(&*out);
         }
-        // what a longer tree left behind
+        // slots left over from a longer tree
         write.extend(left_behind);
         segments.written = len;
         self.writes.push(write);
     }
 
-    /// Gives chunks that changed their boxes, and spawns those that are missing.
+    /// Updates the boxes of changed chunks, and spawns missing chunks.
     fn fit_chunks(&mut self, entity: Entity, segments: &mut SegmentBuffer, len: usize) {
         let full = self.templates.slots();
         for chunk in 0..segments.contents.len() {
@@ -359,8 +155,8 @@ impl SegmentStore<'_, '_> {
         }
     }
 
-    /// Gives a chunk its box. Spawns one that is not known yet, from its first slot, and returns it.
-    pub(super) fn fit_chunk(
+    /// Gives a chunk its box. A chunk that is not known yet is spawned, from its first slot, and returned.
+    fn fit_chunk(
         &mut self,
         (entity, segments): (Entity, &SegmentBuffer),
         known: Option<Entity>,
@@ -384,5 +180,50 @@ impl SegmentStore<'_, '_> {
         );
         let drawn = SegmentChunk { thickest, slots, level: 0, drawn: (0, slots) };
         Some(self.commands.spawn((drawing, drawn, aabb, NoAutoAabb, ChildOf(entity))).id())
+    }
+
+    /// Moves the stumps behind the nodes' slots, whose number may have changed. The slots that they leave belong, or
+    /// belonged, to nodes, and are hidden.
+    fn move_stumps(&mut self, segments: &mut SegmentBuffer) {
+        let first = segments.capacity();
+        let stumps = &mut segments.stumps;
+        if stumps.first == first {
+            return;
+        }
+        let whole_chunks = stumps.slots.len().next_multiple_of(FEWEST_SLOTS);
+        for first in [stumps.first, first].into_iter().filter(|_| whole_chunks > 0) {
+            let mut hidden = SegmentWrite::new(segments.buffer.clone());
+            hidden.extend(first..first + whole_chunks);
+            self.writes.push(hidden);
+        }
+        stumps.first = first;
+        stumps.changed.extend(0..stumps.slots.len() as u32);
+        for chunk in stumps.chunks.drain(..) {
+            self.commands.entity(chunk).try_despawn();
+        }
+    }
+
+    /// Queues changed stumps, and fits the boxes of their chunks.
+    fn write_stumps(&mut self, entity: Entity, segments: &mut SegmentBuffer) {
+        let first = segments.stumps.first;
+        let changed = segments.stumps.take_changed();
+        let mut write = SegmentWrite::new(segments.buffer.clone());
+        for run in &changed {
+            let out = write.extend(first + run.start..first + run.end);
+            out.copy_from_slice(&segments.stumps.slots[run.clone()]);
+        }
+        self.writes.push(write);
+        let mut chunks: Vec<usize> =
+            changed.iter().flat_map(|run| run.start / FEWEST_SLOTS..run.end.div_ceil(FEWEST_SLOTS)).collect();
+        chunks.dedup();
+        for chunk in chunks {
+            let slots = segments.stumps.slots[chunk * FEWEST_SLOTS..].iter().take(FEWEST_SLOTS);
+            let mut contents = ChunkContents::default();
+            contents.add(slots);
+            let known = segments.stumps.chunks.get(chunk).copied();
+            let at = first + chunk * FEWEST_SLOTS;
+            let spawned = self.fit_chunk((entity, segments), known, at, &contents, FEWEST_SLOTS);
+            segments.stumps.chunks.extend(spawned);
+        }
     }
 }

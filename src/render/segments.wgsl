@@ -1,9 +1,9 @@
 // Vertex stage of vessel segments, for the main, prepass, shadow and deferred passes alike.
 //
-// The mesh is one template, a cone with round ends, many times over. A vertex says which segment of the chunk it belongs
-// to and where on the template it sits; the segment's end points, radii and colour come from a storage buffer, in which
-// the chunk starts at the mesh tag. Slots without length or thickness collapse to a point and draw nothing. An end with a
-// negative radius was cut: it is flat, and shows its wall and its lumen.
+// The mesh is many copies of one template, a cone with round ends. A vertex holds its segment of the chunk and its place
+// on the template; the segment's end points, radii and colour come from a storage buffer, in which the chunk starts at
+// the mesh tag. Slots without length or thickness collapse to a point and draw nothing. An end with a negative radius was
+// cut: it is flat, and shows its wall and its lumen.
 //
 // As a segment gets small in the picture, its vertices slide to the corners of the coarser levels, and below a pixel
 // segments drop out one by one while the others get wider: see `detail.rs`.
@@ -36,12 +36,12 @@ struct TemplateVertex {
     @location(0) around: vec3<f32>,
     // segment within the chunk; latitude within the round end, 0 at its rim and 1 at its pole
     @location(1) place: vec2<f32>,
-    // where the vertex slides first: cosine and sine, latitude
+    // the vertex's first goal: cosine and sine, latitude
     @location(2) first_goal: vec3<f32>,
-    // radius in pixels below which it has arrived there; most segments kept, as a share; width in pixels below which
+    // radius in pixels below which it has arrived; most segments kept, as a share; width in pixels below which
     // segments drop out
     @location(3) detail: vec3<f32>,
-    // where it slides then, and the radius in pixels below which it has arrived
+    // its next goals, with the radius in pixels below which it has arrived
     @location(4) second_goal: vec4<f32>,
     @location(5) third_goal: vec4<f32>,
 }
@@ -59,8 +59,8 @@ const QUARTER_TURN: f32 = 1.5707963;
 // Height of the shallow dome that closes a segment's start, in radii.
 const START_DOME: f32 = 0.4;
 
-// Width of the lumen that an open end shows, as a share of the vessel's, and how deep one looks into it, in radii. Walls are
-// drawn thicker than the tenth of the calibre that they have in arteries, or they would not be seen.
+// Width of the lumen of an open end, as a share of the vessel's, and its visible depth, in radii. Walls are drawn thicker
+// than the tenth of the calibre that they have in arteries, so that they are visible.
 const LUMEN: f32 = 0.7;
 const LUMEN_DEPTH: f32 = 1.2;
 // The cut wall is paler than the vessel's outside, and the lumen is dark with blood. Linear sRGB.
@@ -73,13 +73,13 @@ fn open_end(center: vec3<f32>, radial: vec3<f32>, outward: vec3<f32>, radius: f3
     let into_lumen = saturate(2.0 * latitude - 1.0);
     let across = mix(1.0, LUMEN, over_wall) * (1.0 - into_lumen);
     let position = center + radius * (across * radial - LUMEN_DEPTH * into_lumen * outward);
-    // the wall lies across the vessel, the lumen's inside looks towards its axis
+    // the wall lies across the vessel, the lumen's inside faces its axis
     let normal = normalize(mix(mix(radial, outward, over_wall), outward - radial, into_lumen * (1.0 - into_lumen)));
     let face = mix(mix(color, CUT_WALL, over_wall), LUMEN_BLOOD, select(into_lumen, 1.0, into_lumen > 0.0));
     return SurfacePoint(position, normal, face);
 }
 
-// Share by which a segment's threshold may be passed before it is gone, as in `detail.rs`.
+// Share beyond its threshold at which a segment is gone, as in `levels.rs`.
 const FADE: f32 = 0.25;
 
 // Pixels of a unit length, in local space, at a point in the world.
@@ -87,19 +87,19 @@ fn pixels_per_length(world_from_local: mat4x4<f32>, world: vec3<f32>) -> f32 {
     let depth = (view.clip_from_world * vec4(world, 1.0)).w;
     let axes = mat3x3(world_from_local[0].xyz, world_from_local[1].xyz, world_from_local[2].xyz);
     let squared = max(dot(axes[0], axes[0]), max(dot(axes[1], axes[1]), dot(axes[2], axes[2])));
-    // behind the camera and at it, everything is large
+    // at and behind the camera, everything is large
     return 0.5 * view.viewport.w * abs(view.clip_from_view[1][1]) * sqrt(squared) / max(depth, 1e-12);
 }
 
 // Slides a vertex towards a goal, by the radius of its end in pixels: it sets out at twice the radius at which it arrives.
 fn slide(place: vec3<f32>, goal: vec3<f32>, radius: f32, slid_below: f32) -> vec3<f32> {
     let slid = saturate(2.0 - radius / max(slid_below, 1e-12));
-    // at the end exactly there, which `mix` doesn't promise
+    // exactly at the goal in the end, which `mix` doesn't guarantee
     return select(mix(place, goal, slid), goal, slid == 1.0);
 }
 
-// How much wider than itself an end is drawn: 1 while it is thick enough to be seen. Below that, a share of all segments
-// is kept that falls with their width, and is widened so that all together cover what all would.
+// Factor by which an end is drawn wider: 1 while it is thick enough to be visible. Below that, the share of kept segments
+// falls with their width, and these are widened so that together they cover the same area as all would.
 fn widening(slot: u32, radius: f32, detail: vec3<f32>) -> f32 {
     let kept = clamp(2.0 * radius / max(detail.z, 1e-12), 1e-6, detail.y);
     if kept >= 1.0 {
@@ -112,7 +112,7 @@ fn widening(slot: u32, radius: f32, detail: vec3<f32>) -> f32 {
     return own / all;
 }
 
-// The point of a segment's surface that a template vertex stands for, in the mesh's local space. `around` has the end in
+// The point of a segment's surface for a template vertex, in the mesh's local space. `around` has the end in
 // its third component.
 fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32, widening: f32) -> SurfacePoint {
     let along = segment.end - segment.start;
@@ -138,7 +138,7 @@ fn surface_point(segment: Segment, around: vec3<f32>, latitude: f32, widening: f
     let pole = select(-QUARTER_TURN, QUARTER_TURN, around.z > 0.5);
     let elevation = mix(lean, pole, latitude);
     let normal = cos(elevation) * radial + sin(elevation) * axis;
-    // the start has no rings of its own: a full pole would make a point of it where a vessel begins
+    // the start has no rings of its own: a full pole would make it pointed where a vessel begins
     let dome = select(1.0, START_DOME, latitude == 1.0 && around.z < 0.5);
     let offset = reach * cos(elevation) * radial + dome * sin(elevation) * axis;
     return SurfacePoint(center + radius * offset, normal, segment.color);
@@ -160,7 +160,7 @@ fn vertex(in: TemplateVertex) -> VertexOutput {
     let across = across_and_latitude.xy;
     let latitude = across_and_latitude.z;
 
-    // a mirroring transform turns triangles inside out; running around the other way turns them back
+    // a mirroring transform turns triangles inside out; the reverse order around the axis turns them back
     let mirror = mesh_functions::sign_determinant_model_3x3m(mesh[in.instance_index].flags);
     let around = vec3(across.x, across.y * mirror, in.around.z);
     let point = surface_point(segment, around, latitude, widening(slot, radius, in.detail));

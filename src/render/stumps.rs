@@ -1,17 +1,13 @@
-//! What is left of cut vessels: more pieces than their segments have slots.
+//! The remaining pieces of cut vessels, which need more slots than their segments have.
 //!
 //! In: the [`Wounds`] of a tree and the nodes whose segments changed. Out: the segments that are drawn instead.
 //!
-//! Growth's rule stands: slot `i` of the buffer belongs to node `i`. A severed segment shows its first piece there, and one
-//! whose round end would hide the gap of another is shown flat. Its
-//! further pieces have slots behind those of all nodes, in chunks of their own, with their own boxes. A cut, like its
-//! undoing, writes the slots of its segments, of those beside them that look otherwise then, and no others.
+//! As during growth, slot `i` of the buffer belongs to node `i`. A severed segment shows its first piece there; its
+//! further pieces have slots behind those of all nodes, in chunks of their own, with their own boxes. A segment whose
+//! round end would hide the gap of another is drawn with a flat end. A cut or its undo writes only the slots of its
+//! segments and of neighbours whose look changes.
 
-use super::{
-    detail::FEWEST_SLOTS,
-    segments::{ChunkContents, SegmentBuffer, SegmentStore},
-    upload::SegmentWrite,
-};
+use super::levels::FEWEST_SLOTS;
 use crate::{
     plugin::{Changes, Vessels},
     synthesis::{
@@ -23,29 +19,29 @@ use crate::{
 use bevy::prelude::*;
 use std::{collections::BTreeMap, ops::Range};
 
-/// The severed segments of one vessel entity, as they are drawn.
+/// The severed segments of one vessel entity, as drawn.
 #[derive(Debug, Default)]
 pub(super) struct Stumps {
-    /// Which ends of segments are flat, as it follows from wounds and tree.
+    /// The flat ends of segments, derived from wounds and tree.
     flat: FlatEnds,
     /// By node.
     severed: BTreeMap<u32, Severed>,
     /// The further pieces, by their slots behind those of the nodes.
-    slots: Vec<SegmentInstance>,
-    /// Slots that are free, each hidden.
+    pub(super) slots: Vec<SegmentInstance>,
+    /// Free slots, all hidden.
     free: Vec<u32>,
-    /// Slots that are not on the GPU yet; some more than once.
-    changed: Vec<u32>,
-    /// Where the slots begin in the buffer, as it was written last.
-    first: usize,
+    /// Slots that are not on the GPU yet, possibly with repeats.
+    pub(super) changed: Vec<u32>,
+    /// First slot in the buffer, as last written.
+    pub(super) first: usize,
     /// Chunk entities, in the order of the slots.
-    chunks: Vec<Entity>,
+    pub(super) chunks: Vec<Entity>,
 }
 
 /// One severed segment.
 #[derive(Debug)]
 struct Severed {
-    /// What its own slot shows.
+    /// The piece in its own slot.
     own: SegmentInstance,
     /// Slots of its further pieces.
     further: Vec<u32>,
@@ -57,18 +53,18 @@ impl Stumps {
         &self.chunks
     }
 
-    /// Slots that the buffer has to have room for, whole chunks. There is always room for the first cuts.
+    /// Number of slots that the buffer needs, in whole chunks. There is always room for the first cuts.
     pub(super) fn room(&self) -> usize {
         self.slots.len().next_power_of_two().max(FEWEST_SLOTS)
     }
 
-    /// Takes in which segments changed, and adds to them those that look otherwise because of that.
+    /// Reads the changed segments, and adds those whose look changes because of them.
     ///
-    /// Where no more than wounds changed, the cost is that of the segments that did; where the tree is other than before
-    /// (`of_tree`), that of all wounds.
+    /// If only wounds changed, the cost is that of the changed segments; if the tree changed (`of_tree`), that of all
+    /// wounds.
     pub(super) fn note(&mut self, wounds: Option<&Wounds>, vessels: &Vessels, of_tree: bool, changes: &mut Changes) {
         let Some(wounds) = wounds else {
-            // All segments count as changed where a ledger is gone.
+            // All segments count as changed after the ledger is removed.
             self.flat = FlatEnds::default();
             return;
         };
@@ -83,9 +79,9 @@ impl Stumps {
         others.into_iter().for_each(|node| changes.add(node.index()));
     }
 
-    /// Takes in what became of the segments that changed, and forgets those of nodes from `len` on.
+    /// Updates the changed segments, and drops those of nodes from `len` on.
     ///
-    /// The cost is that of what is severed, however much else has changed.
+    /// The cost is that of the severed segments, however many others have changed.
     pub(super) fn update(
         &mut self,
         wounds: Option<&Wounds>,
@@ -155,7 +151,7 @@ impl Stumps {
         }
     }
 
-    /// Puts the first pieces in place of the segments in `out`, which are those of `nodes`, in rising order.
+    /// Puts the first pieces in place of the segments in `out`, which are those of `nodes` in rising order.
     pub(super) fn replace(&self, nodes: &[u32], out: &mut [SegmentInstance]) {
         let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else { return };
         for (node, severed) in self.severed.range(first..=last) {
@@ -165,59 +161,12 @@ impl Stumps {
         }
     }
 
-    /// Runs of slots to be written, rising, and then no longer changed.
-    fn take_changed(&mut self) -> Vec<Range<usize>> {
+    /// Takes the changed slots, as rising runs to be written.
+    pub(super) fn take_changed(&mut self) -> Vec<Range<usize>> {
         let mut changed = std::mem::take(&mut self.changed);
         changed.sort_unstable();
         changed.dedup();
         changed.chunk_by(|a, b| a + 1 == *b).map(|run| run[0] as usize..run[run.len() - 1] as usize + 1).collect()
-    }
-}
-
-impl SegmentStore<'_, '_> {
-    /// Lets the stumps begin behind the nodes' slots, of which the buffer may have another number now. What they leave behind
-    /// becomes slots of nodes, or was, and is hidden.
-    pub(super) fn move_stumps(&mut self, segments: &mut SegmentBuffer) {
-        let first = segments.capacity();
-        let stumps = &mut segments.stumps;
-        if stumps.first == first {
-            return;
-        }
-        let whole_chunks = stumps.slots.len().next_multiple_of(FEWEST_SLOTS);
-        for first in [stumps.first, first].into_iter().filter(|_| whole_chunks > 0) {
-            let mut hidden = SegmentWrite::new(segments.buffer.clone());
-            hidden.extend(first..first + whole_chunks);
-            self.writes.push(hidden);
-        }
-        stumps.first = first;
-        stumps.changed.extend(0..stumps.slots.len() as u32);
-        for chunk in stumps.chunks.drain(..) {
-            self.commands.entity(chunk).try_despawn();
-        }
-    }
-
-    /// Queues the stumps that changed, and fits the boxes of their chunks.
-    pub(super) fn write_stumps(&mut self, entity: Entity, segments: &mut SegmentBuffer) {
-        let first = segments.stumps.first;
-        let changed = segments.stumps.take_changed();
-        let mut write = SegmentWrite::new(segments.buffer.clone());
-        for run in &changed {
-            let out = write.extend(first + run.start..first + run.end);
-            out.copy_from_slice(&segments.stumps.slots[run.clone()]);
-        }
-        self.writes.push(write);
-        let mut chunks: Vec<usize> =
-            changed.iter().flat_map(|run| run.start / FEWEST_SLOTS..run.end.div_ceil(FEWEST_SLOTS)).collect();
-        chunks.dedup();
-        for chunk in chunks {
-            let slots = segments.stumps.slots[chunk * FEWEST_SLOTS..].iter().take(FEWEST_SLOTS);
-            let mut contents = ChunkContents::default();
-            contents.add(slots);
-            let known = segments.stumps.chunks.get(chunk).copied();
-            let at = first + chunk * FEWEST_SLOTS;
-            let spawned = self.fit_chunk((entity, segments), known, at, &contents, FEWEST_SLOTS);
-            segments.stumps.chunks.extend(spawned);
-        }
     }
 }
 

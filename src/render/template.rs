@@ -5,15 +5,15 @@
 //! | attribute | holds |
 //! |---|---|
 //! | position | cosine and sine around the axis, and the end: 0 at the start, 1 at the far one |
-//! | normal | where the vertex slides first as its segment gets small: cosine, sine, latitude |
+//! | normal | first goal of the vertex, as its segment gets small: cosine, sine, latitude |
 //! | texture coordinate | slot within the chunk; latitude within the round end, 0 at its rim and 1 at its pole |
-//! | [`ATTRIBUTE_DETAIL`] | radius in pixels below which it has arrived there; [`Level::most_kept`], [`Level::least_width`] |
-//! | [`ATTRIBUTE_SECOND_GOAL`], [`ATTRIBUTE_THIRD_GOAL`] | where it slides then: cosine, sine, latitude, radius |
+//! | [`ATTRIBUTE_DETAIL`] | radius in pixels below which it has arrived; [`Level::most_kept`], [`Level::least_width`] |
+//! | [`ATTRIBUTE_SECOND_GOAL`], [`ATTRIBUTE_THIRD_GOAL`] | its next goals: cosine, sine, latitude, radius |
 //!
-//! A level's vertices, slid to the next coarser one, are that level, vertex for vertex, and slide on as its own do. So a
-//! chunk can go from one mesh to the next without a visible change, however thick and thin its segments are.
+//! Slid to the next coarser level, a level's vertices equal that level's, vertex for vertex, and slide on as those do.
+//! So a chunk can switch from one mesh to the next without a visible change, whatever the thickness of its segments.
 
-use super::detail::{Goal, Level, Shape};
+use super::levels::{Goal, Level, Shape, corner_reach};
 use bevy::{
     asset::RenderAssetUsages,
     math::ops,
@@ -21,21 +21,21 @@ use bevy::{
 };
 use std::f32::consts::TAU;
 
-/// What the vertex stage needs to know about the level that a vertex belongs to.
+/// The vertex stage's data about the level of a vertex.
 pub(super) const ATTRIBUTE_DETAIL: MeshVertexAttribute =
     MeshVertexAttribute::new("SegmentDetail", 0x7e55_e15d_e7a1, VertexFormat::Float32x3);
 
-/// Where a vertex slides from its first goal.
+/// The second goal of a vertex.
 pub(super) const ATTRIBUTE_SECOND_GOAL: MeshVertexAttribute =
     MeshVertexAttribute::new("SegmentSecondGoal", 0x7e55_e15d_e7a2, VertexFormat::Float32x4);
 
-/// Where a vertex slides from its second goal.
+/// The third goal of a vertex.
 pub(super) const ATTRIBUTE_THIRD_GOAL: MeshVertexAttribute =
     MeshVertexAttribute::new("SegmentThirdGoal", 0x7e55_e15d_e7a3, VertexFormat::Float32x4);
 
-/// Builds a mesh of `slots` segments at a level of detail; of those, the ones that the level keeps.
+/// Builds a mesh of those of `slots` segments that a level of detail keeps.
 ///
-/// The near end has a plain cap: it sits in the round end of the parent segment, and is seen at roots only.
+/// The near end has a plain cap: it sits in the round end of the parent segment, and is visible only at roots.
 pub(super) fn chunk_mesh(level: &Level, slots: usize) -> Mesh {
     let mut template = Template::new(level);
     for slot in (0..slots).filter(|&slot| level.keeps(slot)) {
@@ -45,7 +45,7 @@ pub(super) fn chunk_mesh(level: &Level, slots: usize) -> Mesh {
     let coarse: Vec<[f32; 3]> = first.iter().map(|&[cos, sin, latitude, _]| [cos, sin, latitude]).collect();
     let detail: Vec<[f32; 3]> =
         first.iter().map(|&[.., slid_below]| [slid_below, level.most_kept(), level.least_width]).collect();
-    // the shapes exist on the GPU alone: a copy in the main world would only mislead picking and bounding boxes
+    // the shapes exist only on the GPU: a copy in the main world would mislead picking and bounding boxes
     Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, template.around)
         // the shader knows the true normals, but Bevy's normal prepass expects the attribute
@@ -60,7 +60,7 @@ pub(super) fn chunk_mesh(level: &Level, slots: usize) -> Mesh {
 struct Template<'a> {
     level: &'a Level,
     around: Vec<[f32; 3]>,
-    /// Where vertices slide, and the radius in pixels below which they have arrived.
+    /// The goals of the vertices, with the radius in pixels below which they have arrived.
     goals: [Vec<[f32; 4]>; MOST_GOALS],
     place: Vec<[f32; 2]>,
     indices: Vec<u32>,
@@ -150,8 +150,8 @@ impl RingPlace {
         [cos, sin, self.cap_ring as f32 / (shape.cap_rings + 1) as f32]
     }
 
-    /// The nearest corner of a coarser polygon, on the ring of its cap at or below this one: every one of its corners is the
-    /// goal of some corner, in the same order.
+    /// The nearest corner of a coarser polygon, on the ring of its cap at or below this one. Each corner of that
+    /// polygon is the goal of some corner, in the same order.
     fn goal(self, own: Shape, next: Shape) -> Self {
         Self {
             side: (2 * self.side * next.sides + own.sides) / (2 * own.sides) % next.sides,
@@ -159,7 +159,7 @@ impl RingPlace {
         }
     }
 
-    /// Where it slides, from shape to shape. It stays where there is none left.
+    /// Its goals, from shape to shape. It stays at the last.
     fn goals(mut self, mut own: Shape, goals: &[Goal]) -> [[f32; 4]; MOST_GOALS] {
         std::array::from_fn(|goal| {
             let mut slid_below = 0.0;
@@ -172,25 +172,17 @@ impl RingPlace {
     }
 }
 
-/// A corner of the polygon that stands for a circle of radius 1, as wide as the circle on the mean over all directions.
+/// A corner of the polygon for a circle of radius 1, with the circle's width on average over all directions.
 fn corner(side: u32, sides: u32) -> [f32; 2] {
     let (sin, cos) = ops::sin_cos(TAU * side as f32 / sides as f32);
     let reach = corner_reach(sides);
     [reach * cos, reach * sin]
 }
 
-/// Distance of a regular polygon's corners from its centre, where its mean width is 2.
-///
-/// The mean width of a convex figure is its perimeter over π (Cauchy).
-pub(super) fn corner_reach(sides: u32) -> f32 {
-    let half_turn = TAU / 2.0 / sides as f32;
-    half_turn / ops::sin(half_turn)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::detail::{Detail, Shape};
+    use crate::render::levels::Detail;
     use bevy::{math::Vec3, mesh::VertexAttributeValues};
     use std::collections::BTreeSet;
 
@@ -257,7 +249,7 @@ mod tests {
 
     /// A triangle as three points in the space of the template: around, latitude, slot. Those without area are left out.
     type Corner = [i32; 5];
-    /// After so many slides.
+    /// The mesh's triangles after so many slides.
     fn surface(mesh: &Mesh, slides: usize, kept: impl Fn(usize) -> bool) -> BTreeSet<[Corner; 3]> {
         let [around, place] = [Mesh::ATTRIBUTE_POSITION, Mesh::ATTRIBUTE_UV_0].map(|a| attribute(mesh, a));
         let goals = [Mesh::ATTRIBUTE_NORMAL, ATTRIBUTE_SECOND_GOAL, ATTRIBUTE_THIRD_GOAL].map(|a| attribute(mesh, a));

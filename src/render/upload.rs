@@ -1,9 +1,9 @@
-//! The way of segments from the main world into their buffer on the GPU.
+//! Uploads segments from the main world into their buffer on the GPU.
 //!
-//! A change of the tree queues exactly the segments that it touched as a [`SegmentWrite`]. Extraction moves the queue, not
-//! the bytes, and [`write_segments_to_gpu`] copies them into the buffers: one run of slots as it is, scattered ones by a
-//! compute shader, since thousands of small copies would cost more than what they save. The buffer asset itself holds no
-//! data and changes only to grow, which keeps its contents, by a copy on the GPU.
+//! A change of the tree queues exactly the segments that it touched as a [`SegmentWrite`]. Extraction moves the queue,
+//! not the bytes, and [`write_segments_to_gpu`] copies them into the buffers: a single run of slots directly, scattered
+//! ones by a compute shader, since thousands of small copies would cost more than they save. The buffer asset itself
+//! holds no data. It changes only to grow, and keeps its contents by a copy on the GPU.
 
 use crate::synthesis::instances::SegmentInstance;
 use bevy::{
@@ -27,15 +27,15 @@ use std::ops::Range;
 /// Segments on their way to slots of a buffer.
 #[derive(Debug)]
 pub(super) struct SegmentWrite {
-    /// Keeps the buffer alive until it was written, so that a write can't wait forever for one that is gone.
+    /// Keeps the buffer alive until it was written, so that a write never waits for a dropped buffer.
     buffer: Handle<ShaderBuffer>,
-    /// Where they go, each slot once.
+    /// Their slots, each once.
     slots: Vec<u32>,
     segments: Vec<SegmentInstance>,
 }
 
 impl SegmentWrite {
-    /// Segments that are scattered at once: what a dispatch of one dimension can do, and little enough to be staged.
+    /// Most segments scattered at once: as many as a dispatch of one dimension can do, and few enough to be staged.
     const MOST_SCATTERED: usize = 1 << 20;
 
     pub(super) fn new(buffer: Handle<ShaderBuffer>) -> Self {
@@ -52,7 +52,7 @@ impl SegmentWrite {
         self.segments.len()
     }
 
-    /// Adds segments with their slots, and gives what was added.
+    /// Adds segments with their slots, and returns them.
     pub(super) fn add(
         &mut self,
         segments: impl Iterator<Item = (u32, SegmentInstance)>,
@@ -73,19 +73,19 @@ impl SegmentWrite {
         &mut self.segments[first..]
     }
 
-    /// The slots, if they follow one another.
+    /// The slots as a range, if they are consecutive.
     fn run(&self) -> Option<Range<usize>> {
         let first = *self.slots.first()? as usize;
         self.slots.is_sorted_by(|a, b| a + 1 == *b).then(|| first..first + self.len())
     }
 
-    /// Slots that the buffer must have.
+    /// Number of slots that the buffer must have.
     fn end(&self) -> usize {
         self.slots.iter().max().map_or(0, |&last| last as usize + 1)
     }
 }
 
-/// Writes that wait: in the main world for extraction, in the render world for their buffer to be there.
+/// Waiting writes: in the main world for extraction, in the render world for their buffer.
 #[derive(Resource, Debug, Default)]
 pub(super) struct SegmentWrites {
     queued: Vec<SegmentWrite>,
@@ -115,7 +115,7 @@ pub(super) struct ScatterPipeline {
     pipeline: CachedComputePipelineId,
 }
 
-/// Asks for the pipeline.
+/// Queues the pipeline.
 pub(super) fn queue_scatter_pipeline(mut commands: Commands, assets: Res<AssetServer>, cache: Res<PipelineCache>) {
     let layout = BindGroupLayoutDescriptor::new(
         "scatter segments",
@@ -138,7 +138,7 @@ pub(super) fn queue_scatter_pipeline(mut commands: Commands, assets: Res<AssetSe
     commands.insert_resource(ScatterPipeline { layout, pipeline });
 }
 
-/// Copies waiting segments into those buffers that have room for them; the others are tried again in the next frame.
+/// Copies waiting segments into those buffers that have room for them; the others are retried in the next frame.
 pub(super) fn write_segments_to_gpu(
     mut writes: ResMut<SegmentWrites>,
     buffers: Res<RenderAssets<GpuShaderBuffer>>,
@@ -154,7 +154,7 @@ pub(super) fn write_segments_to_gpu(
     for write in std::mem::take(&mut writes.queued) {
         let bytes = (write.end() * SegmentInstance::SIZE) as u64;
         let room = buffers.get(&write.buffer).map(|gpu| &gpu.buffer).filter(|buffer| bytes <= buffer.size());
-        // what was queued earlier is written earlier: a later write may replace parts of it
+        // writes keep their order: a later one may replace parts of an earlier one
         let written = match (room.filter(|_| !waiting.contains(&write.buffer.id())), write.run(), pipeline) {
             (Some(buffer), Some(run), _) => {
                 let offset = (run.start * SegmentInstance::SIZE) as u64;

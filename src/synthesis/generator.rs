@@ -1,6 +1,6 @@
-//! All makers of vessels under one name: what a preset, a component and a command line hold.
+//! All generators of vessels as one type, for presets, components and command lines.
 //!
-//! In: a tissue, roots and a seed. Out: a [`Growth`], whichever maker it is. To add a maker is to add a variant here.
+//! In: a tissue, roots and a seed. Out: a [`Growth`]. A new generator is a new variant here.
 
 use crate::synthesis::{
     colonization::{Colonization, ColonizationError, ColonizationSettings},
@@ -11,14 +11,14 @@ use crate::synthesis::{
 };
 use std::{any::Any, fmt, sync::Arc};
 
-/// What makes the vessels of an organ, with its settings.
+/// The generator of an organ's vessels, with its settings.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum Generator {
     /// Space colonization: arteries and veins that grow towards drains (Rauch & Harders 2021).
     Colonization(ColonizationSettings),
-    /// A maker of your own. It can't be written to a file.
+    /// A custom generator. It can't be written to a file.
     #[cfg_attr(feature = "serialize", serde(skip))]
     Custom(CustomGenerator),
 }
@@ -26,19 +26,19 @@ pub enum Generator {
 /// Why a generator cannot start.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GeneratorError {
-    /// Space colonization cannot.
+    /// Space colonization cannot start.
     #[error(transparent)]
     Colonization(#[from] ColonizationError),
-    /// A maker of your own cannot.
+    /// A custom generator cannot start.
     #[error("{reason}")]
     Custom {
-        /// What it says.
+        /// Its error message.
         reason: String,
     },
 }
 
 impl Generator {
-    /// Checks every setting against its limits, and names what is unusual.
+    /// Checks every setting against its limits, and returns warnings about unusual ones.
     ///
     /// # Errors
     /// The first setting outside its limits.
@@ -52,8 +52,8 @@ impl Generator {
         }
     }
 
-    /// Fits settings that are made for a tissue of equivalent diameter 1, as those of all presets are, to a tissue of any
-    /// size.
+    /// Fits settings to a tissue of any size. They must be made for a tissue of equivalent diameter 1, as those of all
+    /// presets are.
     #[must_use]
     pub fn fit(self, extent: Extent) -> Self {
         match self {
@@ -71,7 +71,7 @@ impl Generator {
         }
     }
 
-    /// What the placement of roots needs to know, for each kind of vessels that this generator grows.
+    /// The spacing of roots for each kind of vessels that this generator grows.
     pub fn root_spacing(&self) -> ByKind<Option<RootSpacing>> {
         match self {
             Self::Colonization(settings) => settings.root_spacing(),
@@ -82,7 +82,7 @@ impl Generator {
     /// Starts a growth. Lengths in the settings are the tissue's: see [`fit`](Self::fit).
     ///
     /// # Errors
-    /// A setting outside its limits, or roots that cannot be put where they are asked for.
+    /// A setting outside its limits, or roots that cannot be placed as requested.
     pub fn start(&self, tissue: Arc<dyn Tissue>, roots: &Roots, seed: u64) -> Result<Box<dyn Growth>, GeneratorError> {
         match self {
             Self::Colonization(settings) => Ok(Box::new(Colonization::new(tissue, settings.clone(), roots, seed)?)),
@@ -93,7 +93,7 @@ impl Generator {
         }
     }
 
-    /// Starts a growth in place of another one, and uses the memory of that where both are of one maker and on one tissue.
+    /// Starts a growth in place of another one, and reuses its memory if both have the same generator and tissue.
     ///
     /// # Errors
     /// As [`start`](Self::start).
@@ -143,20 +143,21 @@ impl From<ColonizationSettings> for Generator {
     }
 }
 
-/// A maker of vessels that is not part of this crate, for [`CustomGenerator`].
+/// A generator of vessels outside this crate, for [`CustomGenerator`].
 pub trait GrowthMaker: fmt::Debug + Send + Sync {
-    /// For each kind of vessels that it grows, what the placement of roots needs to know. All lengths of the maker are to be
-    /// multiplied by `scale`.
+    /// The spacing of roots for each kind of vessels that it grows. All lengths must be multiplied by `scale`.
     fn root_spacing(&self, scale: f32) -> ByKind<Option<RootSpacing>>;
 
-    /// Starts a growth, with all lengths multiplied by `scale`. [`Roots::resolve`] says where roots are.
+    /// Starts a growth, with all lengths multiplied by `scale`: 1, or the
+    /// [equivalent diameter](Extent::equivalent_diameter) of the tissue if the generator is [fitted](Generator::fit) to
+    /// it. [`Roots::resolve`] gives the places of roots.
     ///
     /// # Errors
-    /// Why it cannot, in words that name the value and the remedy.
+    /// Why it cannot start, in words that name the value and the remedy.
     fn start(&self, tissue: Arc<dyn Tissue>, roots: &Roots, scale: f32, seed: u64) -> Result<Box<dyn Growth>, String>;
 }
 
-/// A maker of vessels of your own. Two are equal if they share one maker and its scale.
+/// A custom generator of vessels. Two are equal if they share their maker and scale.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct CustomGenerator {
@@ -165,7 +166,7 @@ pub struct CustomGenerator {
 }
 
 impl CustomGenerator {
-    /// A generator of a maker, whose lengths are as they stand.
+    /// A generator from a maker, with unscaled lengths.
     pub fn new(maker: impl GrowthMaker + 'static) -> Self {
         Self { maker: Arc::new(maker), scale: 1.0 }
     }

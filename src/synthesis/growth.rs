@@ -1,8 +1,7 @@
-//! What every generator of vessels gives: a growth that goes on step by step, whoever drives it.
+//! The interface of every generator of vessels: a growth that advances step by step.
 //!
-//! In: steps. Out: trees, each with its kind, and what a step changed in them. A frame, a batch job and a file are served
-//! through this trait alone, so that none of them knows which generator is at work. [`generator`](super::generator) names
-//! them all and starts them.
+//! In: steps. Out: trees, each with its kind, and their changes in a step. Frames, batch jobs and files use this trait
+//! alone, so none of them knows the generator. [`generator`](super::generator) lists all generators and starts them.
 
 use crate::synthesis::tree::{BedLink, ByKind, NodeId, VesselKind, VesselTree};
 use bevy_math::Vec3;
@@ -10,21 +9,21 @@ use std::{any::Any, fmt};
 
 /// A growth of vessels under way.
 ///
-/// Call [`advance`](Self::advance) until [`is_finished`](Self::is_finished), and [`settle`](Self::settle) before looking at
-/// the trees; or [`run`](Self::run). What a step does depends on the settings and the seed alone: not on time, frames or the
-/// number of threads.
+/// Call [`advance`](Self::advance) until [`is_finished`](Self::is_finished), and [`settle`](Self::settle) before
+/// looking at the trees; or [`run`](Self::run). A step depends on the settings and the seed alone, not on time, frames
+/// or the number of threads.
 ///
-/// To look at more than this trait tells, such as the reports of a colonization, turn it into its own type again:
+/// To see more than this trait shows, such as the reports of a colonization, cast it to its own type:
 /// `(growth as &dyn Any).downcast_ref::<Colonization>()`.
 pub trait Growth: fmt::Debug + Send + Sync + Any {
     /// Does one step. Does nothing once growth is finished.
     fn advance(&mut self);
 
-    /// Brings the trees up to date with the steps since the last settling, for several steps in a row that nobody looks at
-    /// in between. What that changed is told by [`update`](Self::update).
+    /// Updates the trees after the steps since the last settling. One call may follow several steps, if the trees are
+    /// not read in between. [`update`](Self::update) gives the changes.
     fn settle(&mut self);
 
-    /// Does all steps that are left, and settles.
+    /// Does all remaining steps, and settles.
     fn run(&mut self) {
         while !self.is_finished() {
             self.advance();
@@ -32,31 +31,31 @@ pub trait Growth: fmt::Debug + Send + Sync + Any {
         self.settle();
     }
 
-    /// Whether there is no step left to do.
+    /// Whether all steps are done.
     fn is_finished(&self) -> bool;
 
-    /// How many steps are done, and how many there are.
+    /// The number of steps done, and of all steps.
     fn progress(&self) -> StepCount;
 
-    /// The trees; `None` for a kind that has none. An empty tree is one that has no root.
+    /// The trees; `None` for a kind that has none. An empty tree has no root.
     fn trees(&self) -> ByKind<Option<GrownTree<'_>>>;
 
     /// What the last [`settle`](Self::settle) changed in the tree of a kind.
     fn update(&self, kind: VesselKind) -> TreeUpdate<'_>;
 
-    /// Where blood comes over from the arteries to the veins. Through these the two trees are one circulation.
+    /// Links through which blood flows from the arteries to the veins. They join the two trees to one circulation.
     fn bed_links(&self) -> &[BedLink] {
         &[]
     }
 
-    /// What is unusual about this growth, for whoever chose its settings.
+    /// Warnings about unusual settings of this growth.
     fn warnings(&self) -> Vec<GrowthWarning> {
         Vec::new()
     }
 }
 
 impl dyn Growth + '_ {
-    /// The tree of a kind, on the tissue; `None` where it has none.
+    /// The tree of a kind, on the tissue; `None` if there is none.
     pub fn tree(&self, kind: VesselKind) -> Option<&VesselTree> {
         self.trees()[kind].map(|grown| grown.tree)
     }
@@ -67,12 +66,12 @@ impl dyn Growth + '_ {
     }
 }
 
-/// How many steps of a growth are done.
+/// The steps of a growth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepCount {
     /// Steps done.
     pub done: u32,
-    /// Steps that there are at most. A growth may end earlier, where nothing is left to do.
+    /// Upper limit of the steps. A growth may end earlier, if nothing is left to do.
     pub all: u32,
 }
 
@@ -81,34 +80,33 @@ pub struct StepCount {
 pub struct GrownTree<'a> {
     /// Centre lines, on the tissue.
     pub tree: &'a VesselTree,
-    /// The step in which each node was born, 0 for those that growth began with, and for those beyond its end.
+    /// The step in which each node was born: 0 for initial nodes, and for nodes beyond the end of this list.
     pub birth_steps: &'a [u32],
-    /// How far each node is to be lifted off the tissue before it is drawn or written, in its own radii: the normals of a
-    /// surface. Empty where vessels lie on the tissue.
+    /// Offset of each node from the tissue when it is drawn or written, in its own radii: the normals of a surface.
+    /// Empty if vessels lie on the tissue.
     pub lift: &'a [Vec3],
-    /// Attraction points, terminals or whatever else still waits for a vessel of this kind.
+    /// Number of attraction points, terminals or other places that still need a vessel of this kind.
     pub waiting: usize,
-    /// Distance from a node within which tissue counts as supplied at present, in tissue lengths.
+    /// Present distance from a node within which tissue counts as supplied, in tissue lengths.
     pub reach: f32,
 }
 
 impl<'a> GrownTree<'a> {
-    /// A tree that lies on the tissue, all of it there from the beginning, with nothing left to wait for.
+    /// A tree that lies on the tissue, with all nodes initial and nothing waiting.
     pub fn of(tree: &'a VesselTree) -> Self {
         Self { tree, birth_steps: &[], lift: &[], waiting: 0, reach: 0.0 }
     }
 
-    /// Where a node is drawn: lifted off the surface by its radius where the settings say so.
+    /// The position at which a node is drawn: lifted off the surface by its radius if the settings say so.
     ///
     /// # Panics
-    /// When the node is not of this tree.
+    /// If the node is not in this tree.
     pub fn lifted_position(&self, node: NodeId) -> Vec3 {
         let (position, node) = (self.tree.positions()[node.index()], node.index());
         self.lift.get(node).map_or(position, |&lift| position + lift * self.tree.radii()[node])
     }
 
-    /// The vessels as they are drawn and written: the tree with every node at its
-    /// [`lifted_position`](Self::lifted_position).
+    /// The vessels as drawn and written: the tree with every node at its [`lifted_position`](Self::lifted_position).
     pub fn vessels(&self) -> VesselTree {
         let mut vessels = self.tree.clone();
         for (node, position) in vessels.positions_mut().iter_mut().enumerate() {
@@ -118,16 +116,16 @@ impl<'a> GrownTree<'a> {
     }
 }
 
-/// What became of a tree.
+/// The change of a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TreeUpdate<'a> {
-    /// Nodes were added behind those that there were, and some have another radius.
+    /// Nodes were appended, and some radii changed.
     Grown {
         /// Nodes whose radius changed, new ones included, in any order.
         changed: &'a [u32],
     },
-    /// It is another tree: nodes were put between others, moved or taken away. What is known by a node of the old one, such
-    /// as a wound, has no place in it.
+    /// It is another tree: nodes were inserted, moved or removed. Data that refers to old nodes, such as a wound, is
+    /// invalid.
     Replaced,
 }
 
@@ -136,7 +134,7 @@ pub enum TreeUpdate<'a> {
 pub struct GrowthWarning(String);
 
 impl GrowthWarning {
-    /// A warning of these words.
+    /// A warning with this text.
     pub fn new(words: impl fmt::Display) -> Self {
         Self(words.to_string())
     }

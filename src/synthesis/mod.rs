@@ -1,27 +1,26 @@
-//! Everything that makes vessels, with no engine below it: no world, clock, GPU or handle.
+//! Everything that makes vessels, without an engine: no world, clock, GPU or handle.
 //!
 //! # The pipeline
 //!
-//! 1. An organ's [`mesh`] becomes a [`tissue`]: its surface, its volume, or both in turn, with guides and a density. Or
-//!    the tissue is a plain shape, or a mask.
+//! 1. An organ's [`mesh`] becomes a [`tissue`]: its surface, its volume, or both in turn, with guides and a density.
+//!    The tissue may also be a plain shape or a mask.
 //! 2. [`roots`] say where vessels enter it.
 //! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`](tree::murray).
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
-//! 5. [`haemodynamics`] lets blood flow through them, [`wound`] cuts them and lets it out, [`binding`] moves them with an
-//!    organ that deforms.
+//! 5. [`haemodynamics`] computes blood flow, [`wound`] cuts vessels, [`binding`] moves them with a deforming organ.
 //!
-//! Around these: [`preset`] names settings with their source, [`organ`] makes organs procedurally, [`random`] hands out
-//! random streams, [`space`] finds points and boxes by place, [`units`] turn lengths into metres.
+//! Besides these, [`preset`] names settings with their source, [`organ`] makes procedural organs, [`random`] provides
+//! random streams, [`space`] finds points and boxes by position, and [`units`] turn lengths into metres.
 //!
 //! # Words
 //!
 //! - **Node**: a point of a centre line. **Segment**: the piece from a node's parent to it. **Branch**: a run of
 //!   segments between splits. **Terminal**: a segment whose node has no child. **Root**: a node without a parent.
-//! - **Attraction point**: a spot that pulls vessels. **Drain**: one that lacks oxygen, and pulls arteries; once
-//!   supplied it pulls veins as a carbon-dioxide source.
-//! - **Birth**, **influence** and **kill distance**: how near to others a drain may be born, how far it is heard, and
-//!   how near a node must come to supply it. **Step length**: that of a new segment.
-//! - **Bifurcation exponent** κ: that of Murray's law, r_p^κ = r_l^κ + r_r^κ.
+//! - **Attraction point**: a point that attracts vessels. **Drain**: one that lacks oxygen, and attracts arteries; once
+//!   supplied it attracts veins as a carbon-dioxide source.
+//! - **Birth**, **influence** and **kill distance**: how near to others a drain may be born, how far it acts, and how
+//!   near a node must come to supply it. **Step length**: the length of a new segment.
+//! - **Bifurcation exponent** κ: the exponent of Murray's law, r_p^κ = r_l^κ + r_r^κ.
 //!
 //! # Example
 //!

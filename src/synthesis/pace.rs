@@ -1,11 +1,11 @@
-//! Long work in short stretches, so that who waits for it can do something else in between.
+//! Long work in short stretches, so that the caller can do something else in between.
 //!
-//! A builder that may take longer than a frame is an `async fn` that takes a [`Pace`]. It [rests](Pace::rest) after every
-//! stretch of about a thousand items, and tells with each rest how much of it is done. Whoever polls the future decides
-//! whether a rest is a pause, by a question that it gives to the pace. So nothing here knows a clock or a thread, and the
-//! result is the same with any pauses.
+//! A builder that may take longer than a frame is an `async fn` that takes a [`Pace`]. It [rests](Pace::rest) after
+//! every stretch of about a thousand items, and reports its progress with each rest. The caller gives the pace a
+//! function that decides whether a rest becomes a pause. So nothing here knows a clock or a thread, and the result is
+//! the same with any pauses.
 //!
-//! Each of these builders has a synchronous door beside it, which is [`at_once`].
+//! Each of these builders has a synchronous form, by [`at_once`].
 //!
 //! ```
 //! use bevy_vessels::synthesis::{organ::LiverSettings, pace::Pace, tissue::MeshSurface};
@@ -34,18 +34,18 @@ use std::{
     task::{Context, Poll, Waker},
 };
 
-/// Items between two rests, where each takes some tens of nanoseconds.
+/// Items between two rests, if each takes some tens of nanoseconds.
 pub(crate) const STRETCH: usize = 1024;
-/// Items between two rests, where each takes some microseconds.
+/// Items between two rests, if each takes some microseconds.
 pub(crate) const SHORT_STRETCH: usize = 64;
 
-/// How long work goes on: where it may pause, and how far it is.
+/// The pauses and the progress of long work.
 ///
-/// A clone is a handle to the same. The default is the pace of work that nobody interrupts or watches.
+/// A clone is a handle to the same pace. The default is the pace of work that is neither interrupted nor watched.
 #[derive(Clone, Debug, Default)]
 pub struct Pace {
     watch: Option<Arc<Watch>>,
-    /// The part of the whole work that this pace is of.
+    /// The part of the whole work that this pace covers.
     part: Part,
 }
 
@@ -70,10 +70,10 @@ impl Part {
     }
 }
 
-/// What the one who works and the one who waits share.
+/// State shared by the work and its caller.
 struct Watch {
     pauses: Box<dyn Fn() -> bool + Send + Sync>,
-    /// Bits of an `f32` from 0 to 1. Those of numbers that are not negative are in the order of the numbers.
+    /// Bits of an `f32` from 0 to 1. The bits of non-negative numbers have the order of the numbers.
     progress: AtomicU32,
 }
 
@@ -86,25 +86,26 @@ impl fmt::Debug for Watch {
 impl Pace {
     /// The pace of work that pauses at each rest for which `pauses` is true.
     ///
-    /// A pause ends when the future is polled again, whatever `pauses` says then: work that pauses at every rest ends, too.
+    /// A pause ends when the future is polled again, whatever `pauses` returns then. So work that pauses at every rest
+    /// ends, too.
     pub fn new(pauses: impl Fn() -> bool + Send + Sync + 'static) -> Self {
         let watch = Watch { pauses: Box::new(pauses), progress: AtomicU32::new(0) };
         Self { watch: Some(Arc::new(watch)), part: Part::default() }
     }
 
-    /// Share of the whole work that is done, from 0 to 1. It never falls. 0 for the default pace, which nobody watches.
+    /// Share of the whole work that is done, from 0 to 1. It never falls. 0 for the default pace, which is not watched.
     pub fn progress(&self) -> f32 {
         self.watch.as_ref().map_or(0.0, |watch| f32::from_bits(watch.progress.load(Ordering::Relaxed)))
     }
 
-    /// The pace of a part of this work, from one share of it to another.
+    /// The pace of a part of this work, given by its shares at start and end.
     #[must_use]
     pub fn part(&self, shares: Range<f32>) -> Self {
         let part = Part { from: self.part.at(shares.start), to: self.part.at(shares.end) };
         Self { watch: self.watch.clone(), part }
     }
 
-    /// Rests: tells that a share of this work is done, from 0 to 1, and pauses if that is asked for.
+    /// Rests: reports the share of this work that is done, from 0 to 1, and pauses if asked to.
     pub async fn rest(&self, done: f32) {
         let Some(watch) = &self.watch else { return };
         let progress = self.part.at(done).clamp(0.0, 1.0);
@@ -114,7 +115,7 @@ impl Pace {
         }
     }
 
-    /// Does something with so many items in order, a stretch of them at a time, and rests after each.
+    /// Calls `act` for ranges of `stretch` items, in order, and rests after each.
     pub(crate) async fn stretches(&self, items: usize, stretch: usize, mut act: impl FnMut(Range<usize>)) {
         if items == 0 {
             self.rest(1.0).await;
@@ -126,19 +127,19 @@ impl Pace {
         }
     }
 
-    /// Does something with each of so many items in order, light ones, and rests in between.
+    /// Calls `act` for each of so many light items, in order, and rests in between.
     pub(crate) async fn each(&self, items: usize, mut act: impl FnMut(usize)) {
         self.stretches(items, STRETCH, |stretch| stretch.for_each(&mut act)).await;
     }
 
-    /// Makes a list of so many items, light ones.
+    /// Makes a list of so many light items.
     pub(crate) async fn collect<T>(&self, items: usize, item: impl Fn(usize) -> T) -> Vec<T> {
         let mut list = Vec::with_capacity(items);
         self.stretches(items, STRETCH, |stretch| list.extend(stretch.map(&item))).await;
         list
     }
 
-    /// The first of so many items, light ones, for which something is true.
+    /// The first of `items` cheap items for which `is_it` is true.
     pub(crate) async fn find(&self, items: usize, is_it: impl Fn(usize) -> bool) -> Option<usize> {
         let mut found = None;
         for start in (0..items).step_by(STRETCH) {
@@ -152,14 +153,14 @@ impl Pace {
         found
     }
 
-    /// The sum of so many items, light ones, from the first to the last.
+    /// The sum of `items` cheap items, from the first to the last.
     pub(crate) async fn sum(&self, items: usize, item: impl Fn(usize) -> f64) -> f64 {
         let mut sum = 0.0;
         self.each(items, |number| sum += item(number)).await;
         sum
     }
 
-    /// Sorts a list. Of equal items it makes no difference which comes first: they are the same in every field.
+    /// Sorts a list. The order of equal items doesn't matter: they are the same in every field.
     pub(crate) async fn sort<T: Ord + Copy>(&self, items: &mut Vec<T>) {
         if self.watch.is_none() {
             items.sort_unstable();
@@ -168,7 +169,7 @@ impl Pace {
         let len = items.len();
         let mut run = 4 * STRETCH;
         self.part(0.0..0.5).stretches(len, run, |run| items[run].sort_unstable()).await;
-        // Two runs at a time become one, in another list.
+        // Merges two runs at a time, into another list.
         let mut merged = Vec::with_capacity(len);
         let (merging, passes) = (self.part(0.5..1.0), len.div_ceil(run).max(1).next_power_of_two().ilog2());
         for pass in 0..passes {
@@ -189,7 +190,7 @@ impl Pace {
     }
 }
 
-/// Appends the next `STRETCH` items of two sorted lists, of which some have been `taken`, to what is merged of them.
+/// Merges the next `STRETCH` items of two sorted lists, after those that have been `taken`, into `merged`.
 fn merge<T: Ord + Copy>([first, second]: [&[T]; 2], taken: &mut [usize; 2], merged: &mut Vec<T>) {
     for _ in 0..STRETCH {
         let (next, side) = match (first.get(taken[0]), second.get(taken[1])) {
@@ -203,14 +204,14 @@ fn merge<T: Ord + Copy>([first, second]: [&[T]; 2], taken: &mut [usize; 2], merg
     }
 }
 
-/// Counts work whose items are of different size, and says when it is time to rest.
+/// Counts work with items of different size, and says when to rest.
 #[derive(Debug, Default)]
 pub(crate) struct Stretch {
     done: usize,
 }
 
 impl Stretch {
-    /// Whether a stretch has come to its end with so many items more. The next one begins then.
+    /// Whether a stretch ends after so many more items. The next one begins then.
     pub fn ends_after(&mut self, items: usize) -> bool {
         self.done += items;
         let ends = self.done >= STRETCH;
@@ -221,21 +222,21 @@ impl Stretch {
     }
 }
 
-/// Is pending once.
+/// A future that is pending once.
 async fn pause() {
     let mut has_paused = false;
     poll_fn(|context| {
         if std::mem::replace(&mut has_paused, true) {
             return Poll::Ready(());
         }
-        // Ready to go on at any time: an executor that waits for a word from the work has it.
+        // The work can go on at any time, so an executor that waits for a wake-up gets one.
         context.waker().wake_by_ref();
         Poll::Pending
     })
     .await;
 }
 
-/// Does paced work here and now, from the beginning to the end, over all pauses.
+/// Does paced work synchronously, to the end, through all pauses.
 pub fn at_once<T>(work: impl Future<Output = T>) -> T {
     let mut work = pin!(work);
     let mut context = Context::from_waker(Waker::noop());

@@ -1,6 +1,6 @@
-//! Work on many items, on all threads where that pays, with the same result on any number of them.
+//! Work on many items, on all threads if that pays, with the same result on any number of threads.
 
-/// Fewest items worth handing to another thread, where each takes some tenths of a microsecond.
+/// Fewest items worth handing to another thread, if each takes some tenths of a microsecond.
 const WORTH_SHARING: usize = 256;
 
 #[cfg(feature = "parallel")]
@@ -9,22 +9,22 @@ mod threads {
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     use std::sync::{Mutex, PoisonError};
 
-    /// Shares of the work for each thread: as many as even out that some take longer than others.
+    /// Shares of the work for each thread: enough to balance shares that take longer than others.
     const SHARES: usize = 8;
-    /// How often a thread looks whether the others are done before it goes to sleep: for some tenths of a millisecond. To be
-    /// woken takes nearly as long.
+    /// Number of times that a thread checks whether the others are done before it sleeps: some tenths of a millisecond.
+    /// Waking takes nearly as long.
     const PATIENCE: usize = 4096;
 
-    /// How many of so many items a thread takes at a time; `None` where they are not worth sharing.
+    /// Number of items that a thread takes at a time; `None` if they are not worth sharing.
     pub fn share_of(items: usize, least: usize) -> Option<usize> {
         let threads = rayon::current_num_threads();
         (threads > 1 && items >= 2 * least).then(|| items.div_ceil(SHARES * threads).max(least.div_ceil(4)))
     }
 
-    /// Does all of so many shares of work. Threads take them in turns.
+    /// Does `count` shares of work. Threads take the next share in turn.
     pub fn take_turns<S: Send>(count: usize, shares: impl Iterator<Item = S> + Send, act: impl Fn(S) + Sync) {
         let (shares, unfinished) = (Mutex::new(shares), AtomicUsize::new(count));
-        // The lock is held for no longer than it takes to say which share is next.
+        // The lock is held only while the next share is taken.
         let next = || shares.lock().unwrap_or_else(PoisonError::into_inner).next();
         let work = || {
             while let Some(share) = next() {
@@ -43,7 +43,7 @@ mod threads {
         rayon::join(lead, || on_threads(count.min(rayon::current_num_threads()) - 1, &work));
     }
 
-    /// Does the same on several threads at once.
+    /// Does the same work on several threads at once.
     fn on_threads(count: usize, work: &(impl Fn() + Sync)) {
         if count > 1 {
             rayon::join(work, || on_threads(count - 1, work));
@@ -52,12 +52,12 @@ mod threads {
         }
     }
 
-    /// Says that something is over: done, or ended by a panic. Nobody may wait for it for ever.
+    /// A flag for the end of some work, also when it ends by a panic, so that no thread waits forever.
     #[derive(Default)]
     pub struct Over(AtomicBool);
 
     impl Over {
-        /// Does something and says so afterwards.
+        /// Does some work and sets the flag afterwards.
         pub fn after<R>(&self, act: impl FnOnce() -> R) -> R {
             struct Says<'a>(&'a AtomicBool);
             impl Drop for Says<'_> {
@@ -69,7 +69,7 @@ mod threads {
             act()
         }
 
-        /// Stays awake until it is over, and does what other work there is meanwhile.
+        /// Stays awake until the flag is set, and does other work meanwhile.
         pub fn stand_by(&self) {
             while !self.0.load(Ordering::Acquire) {
                 if rayon::yield_now() != Some(Yield::Executed) {
@@ -80,7 +80,7 @@ mod threads {
     }
 }
 
-/// Does the same to every item, which is also told its index. Each item is worth a thread of its own.
+/// Calls `act` for every item and its index. Each item is worth a thread of its own.
 pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + Sync) {
     #[cfg(feature = "parallel")]
     if items.len() > 1 && rayon::current_num_threads() > 1 {
@@ -90,8 +90,8 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + S
     items.iter_mut().enumerate().for_each(|(index, item)| act(index, item));
 }
 
-/// Does something that shares a little work now and then, while another thread stays awake to take its part at once. To wake
-/// it each time takes as long as a step.
+/// Does work that shares small parts now and then, while another thread stays awake to take them at once. Waking it
+/// each time would take as long as a step.
 pub(crate) fn with_company<R: Send>(act: impl FnOnce() -> R + Send) -> R {
     #[cfg(feature = "parallel")]
     if rayon::current_num_threads() > 1 {
@@ -101,7 +101,7 @@ pub(crate) fn with_company<R: Send>(act: impl FnOnce() -> R + Send) -> R {
     act()
 }
 
-/// Does two things, at once where there are threads. Whoever is done first stays awake for the other's work.
+/// Does two things, in parallel if there are threads. The thread that finishes first stays awake for the other's work.
 pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     #[cfg(feature = "parallel")]
     if rayon::current_num_threads() > 1 {
@@ -140,13 +140,13 @@ where
     });
 }
 
-/// Lets `act` fill what belongs to each of the inputs, some of them at a time.
+/// Lets `act` fill the outputs of the inputs, some at a time.
 pub(crate) fn zip_chunks<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], act: impl Fn(&[I], &mut [O]) + Sync) {
     zip_shares(inputs, outputs, WORTH_SHARING, |_, inputs, outputs| act(inputs, outputs));
 }
 
-/// As [`zip_chunks`]; `act` is also told the index of a chunk's first item.
-#[cfg_attr(not(feature = "parallel"), expect(unused_variables, reason = "one thread has nobody to share with"))]
+/// As [`zip_chunks`], but `act` also gets the index of a chunk's first item.
+#[cfg_attr(not(feature = "parallel"), expect(unused_variables, reason = "one thread shares with no other"))]
 fn zip_shares<I, O>(inputs: &[I], outputs: &mut [O], least: usize, act: impl Fn(usize, &[I], &mut [O]) + Sync)
 where
     I: Sync,

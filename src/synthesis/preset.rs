@@ -1,8 +1,8 @@
 //! Named settings with their source: the paper's, its reference cases, its variations, and organs.
 //!
-//! A preset is a RON file; the built-in ones lie in `assets/presets` and are compiled in. Lengths are made for a tissue
-//! whose equivalent diameter is 1 and are fitted to the organ (see [`Preset::generator_for`]). What a file leaves out has
-//! its default.
+//! A preset is a RON file; the built-in ones are in `assets/presets` and compiled in. Lengths are made for a tissue of
+//! equivalent diameter 1 and are fitted to the organ (see [`Preset::generator_for`]). Settings that a file leaves out
+//! have their defaults.
 
 use crate::synthesis::generator::{Generator, GeneratorError};
 use crate::synthesis::roots::{RootPlacements, Roots};
@@ -10,30 +10,30 @@ use crate::synthesis::tissue::{Extent, TissueSource};
 use std::fmt;
 use std::str::FromStr;
 
-/// Everything that tells one kind of vasculature from another, but for the organ and the seed.
+/// Everything that defines a vasculature except the organ and the seed.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Preset {
-    /// Which form of presets it has. A file without it has the present form.
+    /// Version of the preset format. A file without it has the present version.
     ///
     /// Limits: at most [`Self::VERSION`]. Default: [`Self::VERSION`].
     pub version: u32,
-    /// Where the numbers come from.
+    /// The source of the numbers.
     pub source: String,
-    /// Whether lengths are those of a tissue of equivalent diameter 1, to be fitted to the organ. Otherwise they are
-    /// tissue lengths as they stand.
+    /// Whether lengths are made for a tissue of equivalent diameter 1, and fitted to the organ. Otherwise they are used
+    /// as they are, in tissue lengths.
     ///
     /// Default: true.
     pub fit: bool,
-    /// Where the tissue comes from: an organ's mesh, over its surface, through its volume or in stages; a shape; an image.
+    /// The source of the tissue: the surface or volume of an organ's mesh, or both in stages; a shape; an image.
     ///
     /// Default: the surface of the mesh.
     pub tissue: TissueSource,
     /// Where vessels begin.
     pub roots: RootPlacements,
-    /// What makes the vessels, with its settings.
+    /// The generator of the vessels, with its settings.
     ///
     /// Default: space colonization with the paper's settings.
     pub generator: Generator,
@@ -53,27 +53,27 @@ impl Default for Preset {
 }
 
 impl Preset {
-    /// The present form of presets. It rises when a file of the old form would no longer mean the same.
+    /// The present version of the format. It rises when old files would change their meaning.
     pub const VERSION: u32 = 1;
 
-    /// The generator, with its lengths in those of a tissue of this extent.
+    /// The generator, with its lengths for a tissue of this extent.
     pub fn generator_for(&self, extent: Extent) -> Generator {
         if self.fit { self.generator.clone().fit(extent) } else { self.generator.clone() }
     }
 
-    /// How all kinds of vessels begin.
+    /// The roots of all kinds of vessels.
     pub fn roots(&self) -> Roots {
         self.roots.clone().into()
     }
 
-    /// Reads a preset of the user's own.
+    /// Reads a preset from a file's text.
     ///
     /// # Errors
-    /// Text that is not such a file, with line and column; a file of a newer form than this version of the crate knows; a
-    /// setting outside its limits.
+    /// Text that is not a preset, with line and column; a file of a newer version than this crate knows; a setting
+    /// outside its limits.
     #[cfg(feature = "serialize")]
     pub fn from_ron(text: &str) -> Result<Self, PresetError> {
-        // Asked first, since a newer form may hold what the present one would call an error.
+        // Read first, since a newer version may hold what the present one rejects.
         let Form { version } = ron_options().from_str(text).map_err(Box::new)?;
         if version > Self::VERSION {
             return Err(PresetError::Newer { version });
@@ -94,7 +94,7 @@ impl Preset {
     }
 }
 
-/// What is read of a preset before anything else.
+/// The part of a preset that is read first.
 #[cfg(feature = "serialize")]
 #[derive(serde::Deserialize)]
 #[serde(rename = "Preset", default)]
@@ -121,7 +121,7 @@ pub enum PresetError {
     /// No built-in preset has this name.
     #[error("there is no preset {0:?}; there are {names}", names = PresetName::ALL.map(PresetName::name).join(", "))]
     UnknownName(String),
-    /// A file of a form that this version of the crate doesn't know.
+    /// A file of a version that this crate doesn't know.
     #[error(
         "the preset has version {version}, but this version of {} reads versions up to {}; update it, or save the preset \
          from the older program",

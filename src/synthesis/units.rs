@@ -1,8 +1,8 @@
-//! Physical units: how tissue lengths become metres, and the doors through which pressures and flows come and go.
+//! Physical units: the size of tissue lengths in metres, and conversions of pressures and flows.
 //!
-//! Vessels are made in tissue lengths, which have no size. Blood has one: a [`Scale`] says how many metres a tissue
-//! length is. Outside, quantities are newtypes with a constructor for each unit that people use; inside a computation
-//! they are plain `f64` in SI units.
+//! Vessels are made in tissue lengths, which have no physical size. Blood flow needs one: a [`Scale`] gives the metres
+//! of a tissue length. In interfaces, quantities are newtypes with a constructor for each common unit; inside a
+//! computation they are plain `f64` in SI units.
 
 /// Pascals in a millimetre of mercury.
 ///
@@ -11,7 +11,7 @@ pub const PASCALS_PER_MMHG: f64 = 133.322_387_415;
 
 /// Density of whole blood, in kilograms per cubic metre.
 ///
-/// Source: the usual textbook value, the same that sizes orifices in the literature on bleeding.
+/// Source: the usual textbook value, also used for orifices in the literature on bleeding.
 pub const BLOOD_DENSITY: f64 = 1060.0;
 
 /// Viscosity of whole blood in large vessels, in pascal seconds.
@@ -51,17 +51,17 @@ impl Scale {
     /// An organ whose mesh is in metres, as Bevy's worlds usually are.
     pub const METRES: Self = Self { metres_per_length: 1.0 };
 
-    /// A scale by the metres that one tissue length is.
+    /// A scale with the metres of one tissue length.
     ///
     /// # Errors
-    /// When the number is not finite or not above 0.
+    /// If the number is not finite or not above 0.
     pub fn from_metres(metres: f64) -> Result<Self, ScaleError> {
         let scale = Self { metres_per_length: metres };
         scale.validate()?;
         Ok(scale)
     }
 
-    /// A scale by the millimetres that one tissue length is.
+    /// A scale with the millimetres of one tissue length.
     ///
     /// # Errors
     /// As [`from_metres`](Self::from_metres).
@@ -74,7 +74,7 @@ impl Scale {
         self.metres_per_length
     }
 
-    /// A length in metres, from tissue lengths.
+    /// Converts a length from tissue lengths to metres.
     pub fn to_metres(self, length: f32) -> f64 {
         f64::from(length) * self.metres_per_length
     }
@@ -82,7 +82,7 @@ impl Scale {
     /// Checks a scale that was read from a file.
     ///
     /// # Errors
-    /// When it is not finite or not above 0.
+    /// If it is not finite or not above 0.
     pub fn validate(self) -> Result<(), ScaleError> {
         if self.metres_per_length.is_finite() && self.metres_per_length > 0.0 {
             Ok(())
@@ -92,7 +92,7 @@ impl Scale {
     }
 }
 
-/// Writes a newtype over an `f64` in SI units, with a pair of doors for each unit.
+/// Defines a newtype over an `f64` in SI units, with a constructor and a getter for each unit.
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident {
         $($(#[$from_doc:meta])* $from:ident, $(#[$to_doc:meta])* $to:ident = $factor:expr;)+
@@ -104,7 +104,7 @@ macro_rules! quantity {
         pub struct $name(f64);
 
         impl $name {
-            /// Nothing of it.
+            /// Zero.
             pub const ZERO: Self = Self(0.0);
 
             $(
@@ -123,7 +123,7 @@ macro_rules! quantity {
 }
 
 quantity! {
-    /// A pressure, counted from that of the air.
+    /// A pressure relative to the atmosphere.
     Pressure {
         /// A pressure in pascals.
         from_pascals,
@@ -137,7 +137,7 @@ quantity! {
 }
 
 quantity! {
-    /// A volume in a time.
+    /// A volume per time.
     Flow {
         /// A flow in cubic metres per second.
         from_cubic_metres_per_second,
@@ -151,7 +151,7 @@ quantity! {
 }
 
 quantity! {
-    /// A volume, of blood.
+    /// A volume of blood.
     Volume {
         /// A volume in cubic metres.
         from_cubic_metres,
@@ -179,15 +179,15 @@ quantity! {
 }
 
 quantity! {
-    /// The pressure that a flow takes to pass.
+    /// The pressure per flow that drives it.
     Resistance {
         /// A resistance in pascal seconds per cubic metre.
         from_pascal_seconds_per_cubic_metre,
         /// In pascal seconds per cubic metre.
         pascal_seconds_per_cubic_metre = 1.0;
-        /// A resistance in mmHg for each mL/min, the peripheral resistance unit.
+        /// A resistance in mmHg per mL/min, the peripheral resistance unit.
         from_mmhg_min_per_ml,
-        /// In mmHg for each mL/min.
+        /// In mmHg per mL/min.
         mmhg_min_per_ml = PASCALS_PER_MMHG / (1e-6 / 60.0);
     }
 }

@@ -1,4 +1,4 @@
-//! Tissues that several tests grow vessels in.
+//! Tissues for several tests.
 
 mod torus;
 
@@ -12,7 +12,7 @@ use torus::torus;
 
 /// A tissue of about unit size, with a root for each kind of vessels.
 pub struct Case {
-    /// What messages call it.
+    /// Its name in messages.
     pub name: &'static str,
     /// The tissue.
     pub tissue: Arc<dyn Tissue>,

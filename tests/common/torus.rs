@@ -1,10 +1,10 @@
-//! An organ of triangles that bends both ways.
+//! An organ of triangles with positive and negative curvature.
 
 use bevy_math::{Quat, Vec3};
 use bevy_vessels::synthesis::mesh::TriangleMesh;
 use std::f32::consts::TAU;
 
-/// A closed mesh that bends both ways.
+/// A closed mesh with positive and negative curvature.
 pub fn torus() -> TriangleMesh {
     const AROUND: u32 = 40;
     const ACROSS: u32 = 20;

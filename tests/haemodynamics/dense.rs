@@ -8,7 +8,7 @@ use bevy_vessels::synthesis::{
 use nalgebra::{DMatrix, DVector};
 
 /// Pressures of all nodes above the bed's, by LU decomposition of the network's matrix, in units of the conductance of
-/// a vessel that carries 1 mL/min at 1 mmHg. Open ends are given as what they let out.
+/// a vessel that carries 1 mL/min at 1 mmHg. Open ends are given by their outflow.
 fn dense_pressures(tree: &VesselTree, network: &Network) -> Vec<f64> {
     let unit = 1e-6 / 60.0 / 133.322_387_415;
     let bed = network.settings().bed;
@@ -46,7 +46,7 @@ fn dense_pressures(tree: &VesselTree, network: &Network) -> Vec<f64> {
         }
         sources[root] = network.root_pressure().pascals() - bed.pressure.pascals();
     }
-    // A piece that nothing holds has the bed's pressure, and no flow.
+    // A piece without a held pressure has the bed's pressure, and no flow.
     let (pieces, held) = (pieces(tree, network), held_pieces(tree, network));
     for node in (0..n).filter(|&node| !held[pieces[node]]) {
         matrix.row_mut(node).fill(0.0);

@@ -1,4 +1,4 @@
-//! A network that was changed is the same as one made anew.
+//! A changed network equals a new one.
 
 use super::trees::{random_gap, random_tree, resisting, rng, settings, wound};
 use bevy_math::Vec3;
@@ -62,7 +62,7 @@ fn changes_of_all_kinds_lead_to_the_full_solution() {
                 _ => {}
             }
             let what = format!("seed {seed}, round {round}");
-            // Along one path first, without the sweep.
+            // First along one path, without the sweep.
             let pressure = network.pressure_at(node).unwrap().pascals();
             let expected = anew(&tree, &network);
             assert!((pressure - expected.pressures()[node.index()]).abs() < 1e-4, "{what}: {pressure} Pa");
@@ -102,7 +102,7 @@ fn random_gaps(rng: &mut rand_chacha::ChaCha8Rng, tree: &VesselTree, count: usiz
 fn many_gaps_at_once_are_the_same_as_one_by_one() {
     for seed in 0..30 {
         let mut rng = rng(seed);
-        // Large enough that few gaps are summed along their paths, and many in one sweep.
+        // Large enough that few gaps are summed along their paths, but many in one sweep.
         let tree = random_tree(&mut rng, 6_000);
         let settings = if seed % 2 == 0 { settings() } else { resisting(1.0) };
         let mut at_once = Network::new(&tree, settings).expect("valid numbers");
@@ -110,7 +110,7 @@ fn many_gaps_at_once_are_the_same_as_one_by_one() {
         let mut one_by_one = at_once.clone();
         for count in [25, 40, 900, 30, 0, 700] {
             let mut gaps = random_gaps(&mut rng, &tree, count);
-            // Some stay as they are, and keep how far they have closed.
+            // Some stay as they are, and keep their openings.
             gaps.extend(at_once.interruptions().filter(|(node, _)| node.0 % 3 == 0));
             gaps.sort_by_key(|&(node, _)| node);
             gaps.dedup_by_key(|&mut (node, _)| node);

@@ -105,7 +105,7 @@ fn what_arteries_give_arrives_in_the_veins() {
 }
 
 impl Organ {
-    /// Nodes of both trees whose pressure nothing holds, neither a root nor the pool, be it through links.
+    /// Nodes of both trees whose pressure is held neither by a root nor by the pool, even through links.
     fn floating(&self) -> Vec<usize> {
         let n = self.trees[0].len();
         let pieces: Vec<Vec<usize>> =
@@ -223,7 +223,7 @@ fn links_may_come_and_go() {
         for (found, expected) in organ.circulation.arterial().flows().iter().zip(&before) {
             assert!((found - expected).abs() < 1e-9 * largest, "seed {seed}: {found}, not {expected}");
         }
-        // Apart again, they are the networks that they were.
+        // Separated again, they are the original networks.
         let [mut arterial, _] = organ.circulation.clone().into_networks();
         arterial.solve().unwrap();
         let mut alone = Network::new(&organ.trees[0], resisting(2.0)).unwrap();

@@ -86,7 +86,7 @@ fn imbalance(network: &Network, tree: &VesselTree) -> f64 {
     for (node, parent) in tree.segments() {
         left[parent] -= network.flows()[node];
         if network.interruption(NodeId(node as u32)).is_some() {
-            // What arrives at the node is not what left the parent.
+            // The flow that enters an interrupted segment does not arrive at its node.
             left[node] -= network.flows()[node];
         }
     }
@@ -96,7 +96,7 @@ fn imbalance(network: &Network, tree: &VesselTree) -> f64 {
     for (node, left) in left.iter_mut().enumerate() {
         *left -= network.bed_flow(node);
     }
-    // A root's flow is that into its tree, so that a root balances too.
+    // A root's flow is the flow into its tree, so that a root balances, too.
     let largest = network.flows().iter().fold(1e-30, |a: f64, b| a.max(b.abs()));
     left.iter().fold(0.0, |a: f64, b| a.max(b.abs())) / largest
 }
@@ -149,7 +149,7 @@ fn every_open_end_obeys_the_orifice_law() {
         for end in network.open_ends() {
             let area = PI * (f64::from(end.outlet.radius) * 1e-3).powi(2) * end.opening;
             let ideal = end.flow().cubic_metres_per_second() / (0.29 * area);
-            // Above the air's pressure. Below it nothing flows.
+            // Relative to the atmosphere. Below that nothing flows.
             let (found, expected) = (end.pressure().pascals().max(0.0), 530.0 * ideal * ideal);
             assert!(
                 (found - expected).abs() <= 1e-6 * expected + 1e-8,

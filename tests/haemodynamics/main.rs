@@ -1,4 +1,4 @@
-//! Blood flow against laws, symmetric trees, a dense linear solver, and itself solved anew.
+//! Blood flow against laws, symmetric trees, a dense linear solver, and fresh solutions.
 
 mod dense;
 mod incremental;

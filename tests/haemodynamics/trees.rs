@@ -1,4 +1,4 @@
-//! Trees and settings to test flow on.
+//! Trees and settings for tests of flow.
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
@@ -34,14 +34,14 @@ pub fn random_tree(rng: &mut ChaCha8Rng, nodes: usize) -> VesselTree {
     VesselTree::from_arrays(positions, tree.parents().to_vec(), tree.radii().to_vec()).expect("a well-formed tree")
 }
 
-/// The same without segments of no length, whose conductances leave a dense solver no digits.
+/// The same without segments of zero length, whose conductances leave a dense solver no accuracy.
 pub fn drawn_tree(rng: &mut ChaCha8Rng, nodes: usize) -> VesselTree {
     let mut positions = Vec::new();
     let mut parents = Vec::new();
     let mut radii = Vec::new();
     for node in 0..nodes as u32 {
         let is_root = node == 0 || rng.random_bool(0.05);
-        // Long vessels, broad fans, and what lies between.
+        // Long vessels, broad fans, and shapes in between.
         let parent = if rng.random_bool(0.5) { node.saturating_sub(1) } else { rng.random_range(0..node.max(1)) };
         parents.push(if is_root { NO_PARENT } else { parent });
         positions.push(Vec3::from(std::array::from_fn(|_| rng.random_range(-5.0..5.0_f32))));
@@ -67,7 +67,7 @@ pub fn resisting(mmhg_min_per_ml: f64) -> FlowSettings {
     settings
 }
 
-/// A gap anywhere in a segment, with each end open or closed.
+/// A gap at any place in a segment, with each end open or closed.
 pub fn random_gap(rng: &mut ChaCha8Rng) -> Interruption {
     let (a, b) = (rng.random_range(0.0..=1.0_f32), rng.random_range(0.0..=1.0_f32));
     let outlet = |rng: &mut ChaCha8Rng| {
@@ -87,7 +87,7 @@ pub fn wound(rng: &mut ChaCha8Rng, network: &mut Network, tree: &VesselTree, gap
     }
 }
 
-/// The piece that every node is of: the root or the interrupted segment's node that it hangs from.
+/// The piece of every node: the root, or the node of the interrupted segment, that it hangs from.
 pub fn pieces(tree: &VesselTree, network: &Network) -> Vec<usize> {
     let mut pieces: Vec<usize> = (0..tree.len()).collect();
     for (node, parent) in tree.segments() {

@@ -1,4 +1,4 @@
-//! The budget decides how many steps a frame does, and nothing else.
+//! The budget decides only how many steps a frame does.
 
 use super::*;
 use bevy_vessels::plugin::{EntityCommandsExt, GrowthFrame, GrowthStarted};
@@ -78,14 +78,14 @@ fn many_growths_start_one_by_one_where_there_is_no_time_and_all_start() {
         started = now;
         now == organs.len()
     });
-    // all want another start at once: each frame gives it to the next one
+    // all need a restart at once: each frame starts the next one
     for &organ in &organs {
         app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes").seed += 100;
     }
     let mut cursor = app.world().resource::<Messages<GrowthStarted>>().get_cursor_current();
     let mut restarted = Vec::new();
     for _ in 0..organs.len() {
-        // one that wishes again every frame keeps nobody from having a turn
+        // an organ that changes every frame doesn't take the others' turns
         app.world_mut().get_mut::<Vasculature>(organs[0]).expect("an organ has wishes").seed += 1;
         app.update();
         let frame: Vec<_> = drain(app.world(), &mut cursor).iter().map(|start| start.organ).collect();

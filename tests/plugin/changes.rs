@@ -1,4 +1,4 @@
-//! Wishes and meshes that change while vessels grow, or come late; and who reads what changed in the vessels.
+//! Settings and meshes that change while vessels grow, or come late; and readers of the changes in vessels.
 
 use super::operating_field::*;
 use super::*;
@@ -8,7 +8,7 @@ use bevy_vessels::{
 };
 use std::ptr;
 
-/// Address of the tissue that is grown on, to see whether it was prepared again.
+/// Address of the tissue, which shows whether it was prepared again.
 fn tissue(world: &World, organ: Entity) -> *const () {
     let state = world.get::<GrowthState>(organ).expect("an organ has a state");
     state.tissue().map_or(ptr::null(), |tissue: &dyn Tissue| ptr::from_ref(tissue).cast())
@@ -87,7 +87,7 @@ fn a_replaced_mesh_is_prepared_again() {
     assert!((area - 3.4).abs() < 1e-5, "the cuboid's surface is {area}");
 }
 
-/// Meshes and wishes that change while a tissue is being prepared: what comes out is that of the last.
+/// Meshes and settings that change while a tissue is being prepared: the last ones decide the result.
 #[test]
 fn an_outdated_tissue_never_arrives() {
     let wish = || quick().with_seed(5);
@@ -137,7 +137,7 @@ fn taking_the_mesh_away_waits_for_another() {
     assert_published(app.world(), organ);
 }
 
-/// A reader that copies what changed, as a renderer does, in every so many frames.
+/// A reader that copies the changes, as a renderer does, once in a number of frames.
 #[derive(Default)]
 struct Copier {
     period: usize,
@@ -146,7 +146,7 @@ struct Copier {
 }
 
 impl Copier {
-    /// Copies: then the copy is right, and nothing was marked for nothing.
+    /// Copies the changes, and checks that the copy is right and that no unchanged segment was marked.
     #[track_caller]
     fn read(&mut self, log: &ChangeLog, tree: &VesselTree) {
         let now: Vec<_> = (0..tree.len()).map(|node| segment(tree, node)).collect();
@@ -159,13 +159,13 @@ impl Copier {
     }
 }
 
-/// Readers at different frame rates: each gets exactly what its copy needs, whatever the others have read.
+/// Readers at different frame rates: each gets exactly the changes that its copy needs, whatever the others have read.
 #[test]
 fn each_reader_gets_exactly_what_its_copy_needs() {
     [1, 7].into_iter().for_each(assert_changes_exact);
 }
 
-/// Grows with so many steps a frame.
+/// Grows with so many steps per frame.
 fn assert_changes_exact(steps: u32) {
     let mut app = headless(GrowthBudget::Steps(steps));
     let mut wish = quick();
@@ -197,7 +197,7 @@ fn assert_changes_exact(steps: u32) {
     }
 }
 
-/// What a reader finds that has seen everything before.
+/// The changes for a reader that has seen everything before.
 fn changes_since(app: &App, cursor: &mut ChangeCursor, entity: Entity) -> Changes {
     cursor.read(app.world().get::<ChangeLog>(entity).expect("vessels keep their changes"))
 }
@@ -215,7 +215,7 @@ fn other_vessels_are_changed_throughout() {
     change(&mut app, organ, |wish| wish.seed = 3);
     app.update();
     assert!(changes_since(&app, &mut cursor, entity).is_all(), "after a restart");
-    // By hand, with nothing marked: on another entity, inserted, and written over in place.
+    // Changed by the test without marks: on another entity, inserted, and overwritten in place.
     let other = tube(1.0, 0.1, 100);
     let vessels = || Vessels::from_tree(VesselKind::Artery, &other, &[]);
     let entity = app.world_mut().spawn((VesselsOf(organ), vessels())).id();

@@ -1,4 +1,4 @@
-//! Blood flows in organs of a world, and is lost.
+//! Blood flows in organs of a Bevy world, and is lost.
 
 use super::operating_field::*;
 use super::*;
@@ -20,7 +20,7 @@ use bevy_vessels::{
 
 const FRAME: Duration = Duration::from_millis(16);
 
-/// Ends that stay where they are cut and don't clot, in blood of one viscosity.
+/// Ends that neither retract nor clot, in blood of constant viscosity.
 fn plain() -> (Cuttable, Perfusion) {
     let perfusion = Perfusion {
         viscosity: ViscosityLaw::Constant(Viscosity::from_centipoise(3.5)),
@@ -79,7 +79,7 @@ fn nothing_bleeds_behind_a_clamp_and_messages_say_so() {
         let end = app.world().get::<OpenEnd>(start.entity).expect("the end is an entity");
         assert_eq!((end.id, end.side, end.state), (start.end, start.side, EndState::Bleeding));
     }
-    // On the stem: the proximal end has no root any more, only the other branch's bed.
+    // On the stem: the proximal end is cut off from the root, and fed only by the other branch's bed.
     let stem = artery(&app, organ);
     operate(&mut app, |vessels| vessels.clamp_at(stem, Place::new(NodeId(1), 0.5)));
     operate(&mut app, |vessels| vessels.clamp_at(stem, Place::new(NodeId(3), 0.5)));
@@ -89,7 +89,7 @@ fn nothing_bleeds_behind_a_clamp_and_messages_say_so() {
     let ended: Vec<BleedingStopped> = drain(app.world(), &mut stopped);
     let proximal_start = begun.iter().find(|start| start.side == EndSide::Proximal).unwrap();
     assert!(matches!(ended[..], [stop] if stop.end == proximal.id && stop.entity == Some(proximal_start.entity)));
-    // On the far piece: its end is closed, and gone.
+    // On the far piece: its end is closed, and its entity despawned.
     operate(&mut app, |vessels| vessels.clamp_at(stem, Place::new(NodeId(2), 0.9)));
     let ended: Vec<BleedingStopped> = drain(app.world(), &mut stopped);
     assert!(matches!(ended[..], [stop] if stop.side == EndSide::Distal && stop.entity.is_none()));
@@ -197,7 +197,7 @@ fn tissue_below_a_cut_lacks_blood_until_it_is_undone() {
     assert!(supply(&app).vertices.iter().chain(&segments(&app)).all(|&supply| (supply - 1.0).abs() < 1e-5));
 }
 
-/// Through the bed, veins feel it when no artery brings blood; apart, they have the pool's pressure all the same.
+/// Joined through the bed, veins lose supply when no artery brings blood; apart, they still have the pool's pressure.
 #[test]
 fn a_bed_with_resistance_joins_arteries_and_veins() {
     let venous_supply = |bed: BedSettings| {

@@ -1,4 +1,4 @@
-//! Vessels are cut, closed and healed on organs in a world.
+//! Vessels are cut, closed and healed on organs in a Bevy world.
 
 use super::operating_field::*;
 use super::*;
@@ -16,7 +16,7 @@ use bevy_vessels::{
 
 const FRAME: Duration = Duration::from_millis(16);
 
-/// Where an organ hangs in these tests: turned, mirrored and scaled unevenly, below a parent that is, too.
+/// Transform of an organ in these tests: rotated, mirrored and scaled non-uniformly, as is its parent.
 fn hang_askew(app: &mut App, organ: Entity) {
     let turn = Quat::from_euler(EulerRot::XYZ, 0.4, -1.1, 2.0);
     let parent = Transform { translation: Vec3::new(3.0, -2.0, 5.0), rotation: turn, scale: Vec3::new(2.0, 0.5, 1.5) };
@@ -31,7 +31,7 @@ fn to_world(app: &App, organ: Entity, kind: VesselKind) -> Affine3A {
     app.world().get::<GlobalTransform>(vessels).expect("vessels are somewhere").affine()
 }
 
-/// Segments whose ends lie on both sides of a plane of the world.
+/// Segments that cross a plane of the world.
 fn across_plane(app: &App, organ: Entity, kind: VesselKind, point: Vec3, normal: Vec3) -> Vec<NodeId> {
     let (vessels, to_world) = (published(app.world(), organ, kind), to_world(app, organ, kind));
     let side = |node: usize| (to_world.transform_point3(vessels.tree().positions()[node]) - point).dot(normal) > 0.0;
@@ -77,7 +77,7 @@ fn an_action_goes_to_all_organs_or_to_the_one_that_it_names() {
     assert_eq!(organs.map(|organ| is_whole(&app, organ)), [false, true, false]);
     operate(&mut app, |vessels| vessels.request(VesselCommand::new(VesselAction::Cut(blade)).on(organs[1])));
     assert_eq!(organs.map(|organ| severed(app.world(), organ, VesselKind::Artery).len()), [1, 1, 1]);
-    // The last action touched the second organ alone, the one before what was left of the first.
+    // The last action changed only the second organ, the one before it the rest of the first.
     operate(&mut app, CuttableVessels::undo);
     assert_eq!(organs.map(|organ| is_whole(&app, organ)), [false, true, false]);
     operate(&mut app, CuttableVessels::undo);
@@ -121,7 +121,7 @@ fn messages_and_the_resource_do_the_same() {
     assert!(results[0].1.iter().all(|ends| ends.len() > 4), "{:?}", results[0].1);
 }
 
-/// A scalpel's way along x over some of a tube's segments, in as many frames: the number of the segment that each crosses.
+/// A scalpel's sweeps along x over some of a tube's segments, one per frame, each with the node of its segment.
 fn sweeps(segments: std::ops::Range<u32>) -> impl Iterator<Item = (NodeId, Blade)> {
     segments.map(|node| (NodeId(node), square(Vec3::X * (node as f32 - 0.5), Vec3::X, 1.0)))
 }
@@ -178,7 +178,7 @@ fn strokes_of_two_hands_are_undone_apart_unless_they_meet() {
     assert_eq!(severed_of(&app), [4, 4]);
     operate(&mut app, CuttableVessels::undo);
     assert_eq!(severed_of(&app), [4, 0], "the one that began last");
-    // The scalpel goes on over what the cautery sealed, on the same vessel: neither can be undone without the other.
+    // The scalpel goes on over sealed parts of the same vessel: neither stroke can be undone without the other.
     let cautery = StrokeId::begin();
     for (node, blade) in sweeps(6..9) {
         let ball = Blade::ball(Vec3::X * (node.0 as f32 + 4.5), 0.3).expect("a ball");
@@ -262,7 +262,7 @@ fn clamps_find_the_nearest_vessel_of_the_world() {
     assert_eq!(wounds(app.world(), right, VesselKind::Artery).clamps().count(), 0);
 }
 
-/// Against all segments, one by one, in the world.
+/// Compared with all segments, one by one, in the world.
 #[test]
 fn the_picker_finds_the_nearest_wall_under_uneven_scale() {
     let mut app = timed_app(FRAME);
@@ -326,7 +326,7 @@ fn wounds_stay_while_vessels_go_on_growing() {
     app.update();
     let (point, normal) = (Vec3::Y * 0.3, Vec3::Y);
     cut(&mut app, square(point, normal, 3.0));
-    // A frame's step comes before its cuts, which meet what has just grown.
+    // A frame's step comes before its cuts, which also sever new segments.
     let first = across_plane(&app, organ, VesselKind::Artery, point, normal);
     assert_eq!(severed(app.world(), organ, VesselKind::Artery), first);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);

@@ -1,4 +1,4 @@
-//! Vessels follow an organ that is deformed, and are cut where they are then.
+//! Vessels follow a deformed organ, and are cut at their deformed positions.
 
 use super::operating_field::*;
 use super::*;
@@ -32,7 +32,7 @@ fn following(app: &mut App) -> Entity {
     organ
 }
 
-/// A shear that leaves lengths across the surface nearly as they are.
+/// A shear that nearly keeps lengths across the surface.
 fn shear(at: Vec3) -> Vec3 {
     at + Vec3::new(2.0 + 0.3 * at.y, -1.0, 0.5)
 }
@@ -55,7 +55,7 @@ fn vessels_follow_in_the_same_frame_and_nothing_grows_again() {
         assert_eq!((vessels.tree().parents(), vessels.tree().radii()), (before.parents(), before.radii()));
         let (min, max) = (vessels.aabb().min(), vessels.aabb().max());
         for (now, before) in vessels.tree().positions().iter().zip(before.positions()) {
-            // Nodes stand off the surface by their radius, and that along its normal, which a shear turns.
+            // Nodes are lifted off the surface by their radius along its normal, which a shear turns.
             assert!(now.distance(shear(*before)) < 0.02, "{now} for {}", shear(*before));
             assert!(Vec3A::from(*now).cmpge(min).all() && Vec3A::from(*now).cmple(max).all());
         }
@@ -94,7 +94,7 @@ fn what_is_cut_is_where_the_organ_has_it() {
         let crossed: Vec<NodeId> = crossed.map(|(node, _)| NodeId(node as u32)).collect();
         assert!(!crossed.is_empty());
         assert!(crossed.iter().all(|&node| wounds(app.world(), organ, kind).is_severed(node)));
-        // Others may be gone where an end drew back past their node: each lumen has two ends all the same.
+        // Others may be gone if an end retracted past their node, but each lumen still has two ends.
         assert_eq!(ends(&app, kind), ends_before[kind.index()] + 2 * crossed.len());
     }
 }
@@ -154,7 +154,7 @@ fn another_number_of_vertices_is_another_organ() {
     let organ = following(&mut app);
     let before = trees(app.world(), organ);
     edit_mesh(&mut app, organ, |mesh| *mesh = Sphere::new(0.5).mesh().uv(40, 20));
-    // A quick machine grows it anew within one frame.
+    // A fast machine grows it again within one frame.
     let nodes = progress(app.world(), organ).nodes;
     run_until(&mut app, "a restart", |world| progress(world, organ).nodes != nodes);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
@@ -200,7 +200,7 @@ fn solid_box(n: u32) -> TetMesh {
     TetMesh::new(positions, tetrahedra).expect("tetrahedra")
 }
 
-/// Vessels through a box, which follow its tetrahedra.
+/// Vessels through a box that follow its tetrahedra.
 fn solid(app: &mut App) -> Entity {
     let mut vasculature = quick();
     vasculature.tissue = TissueMode::Volume.into();
@@ -251,7 +251,7 @@ fn vessels_within_a_sheared_box_move_as_every_point_of_it() {
         let direction = map.transform_vector3(before.direction).normalize();
         assert!(now.direction.distance(direction) < 1e-3, "{} for {direction}", now.direction);
     }
-    // The blade meets them where they are.
+    // The blade cuts them at their moved positions.
     let level = map.transform_point3(2.0 * point).y;
     cut(&mut app, square(Vec3::Y * level, normal, 3.0));
     let vessels = published(app.world(), organ, VesselKind::Artery);

@@ -1,4 +1,4 @@
-//! The plugin beside all of Bevy's own, with no graphics card, and organs from files.
+//! The plugin with all of Bevy's default plugins, without a graphics card, and organs from files.
 
 use super::*;
 use bevy::{

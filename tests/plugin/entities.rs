@@ -1,4 +1,4 @@
-//! Vessel entities belong to their organ: they come, move, hide and go with it.
+//! Vessel entities belong to their organ: they are spawned, moved, hidden and despawned with it.
 
 use super::*;
 use bevy_vessels::plugin::{VesselAppearance, VesselsOf};
@@ -74,7 +74,7 @@ fn despawning_an_organ_removes_all_of_it_in_any_phase() {
     }
 }
 
-/// The organ goes by a command in the very frame in which its vessels are spawned by one.
+/// A command despawns the organ in the same frame in which another spawns its vessels.
 #[test]
 fn despawning_an_organ_while_its_vessels_are_spawned_leaves_none() {
     let mut app = headless(GrowthBudget::default());

@@ -1,4 +1,4 @@
-//! What can be wrong with an organ is named, stops that organ only, and can be repaired.
+//! An error of an organ is named, stops only that organ, and can be repaired.
 
 use super::*;
 use bevy::{
@@ -7,7 +7,7 @@ use bevy::{
 };
 use bevy_vessels::plugin::{GrowthFailed, OrganGrowthError, OrganMeshError};
 
-/// Runs until the organ fails; gives the message.
+/// Runs until the organ fails, and returns the error.
 #[track_caller]
 pub fn failure(app: &mut App, organ: Entity) -> GrowthFailed {
     let mut cursor = MessageCursor::default();
@@ -17,7 +17,7 @@ pub fn failure(app: &mut App, organ: Entity) -> GrowthFailed {
         failures.extend(drain::<GrowthFailed>(world, &mut cursor));
         !failures.is_empty()
     });
-    // Frames with asset events that are still to come must not make it fail a second time.
+    // Later frames with asset events must not make it fail a second time.
     for _ in 0..5 {
         app.update();
         failures.extend(drain::<GrowthFailed>(app.world(), &mut cursor));

@@ -1,4 +1,4 @@
-//! An organ grows, and obeys.
+//! An organ grows, and follows commands.
 
 use super::*;
 use bevy_vessels::plugin::{EntityCommandsExt, GrowthControl, GrowthFinished, GrowthFrame, GrowthStarted, diagnostics};

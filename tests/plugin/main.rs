@@ -50,17 +50,17 @@ const KINDS: [VesselKind; 2] = Colonization::KINDS;
 /// Whether all jobs of these apps are done in slices.
 const IN_SLICES: bool = matches!(env!("CARGO_CRATE_NAME").as_bytes(), b"plugin_in_slices");
 
-/// How jobs are done in this target.
+/// The settings of jobs in this target.
 fn jobs() -> JobSettings {
     if IN_SLICES { JobSettings { mode: JobMode::Slices, at_once: 0, ..default() } } else { default() }
 }
 
-/// An app as small as vessels allow.
+/// The smallest app that can grow vessels.
 fn headless(budget: GrowthBudget) -> App {
     headless_with_assets(budget, AssetPlugin::default())
 }
 
-/// An app as small as vessels allow, with assets from somewhere else.
+/// The same, with assets from elsewhere.
 fn headless_with_assets(budget: GrowthBudget, assets: AssetPlugin) -> App {
     let mut app = App::new();
     let growth = GrowthPlugin::default().with_budget(budget);
@@ -82,7 +82,7 @@ fn quick() -> Vasculature {
     vasculature
 }
 
-/// The settings of vessels that are grown by space colonization, as those of all presets are.
+/// The settings of space colonization, which all presets use.
 fn settings_of(vasculature: &mut Vasculature) -> &mut ColonizationSettings {
     vasculature.generator.colonization_mut().expect("presets colonize")
 }
@@ -137,7 +137,7 @@ fn vessel_entity(world: &World, organ: Entity, kind: VesselKind) -> Option<Entit
     vessels.entities().iter().copied().find(|&entity| is_of_kind(entity))
 }
 
-/// A copy of what is published of a kind.
+/// A copy of the published vessels of a kind.
 fn published(world: &World, organ: Entity, kind: VesselKind) -> Vessels {
     let entity = vessel_entity(world, organ, kind).expect("the kind has vessels");
     world.get::<Vessels>(entity).expect("a vessel entity has vessels").clone()
@@ -147,7 +147,7 @@ fn trees(world: &World, organ: Entity) -> [VesselTree; 2] {
     KINDS.map(|kind| published(world, organ, kind).tree().clone())
 }
 
-/// A tree with other positions and radii, and more nodes.
+/// A tree with changed positions and radii, and more nodes.
 fn edited(tree: &VesselTree, edit: impl FnOnce(&mut Vec<Vec3>, &mut Vec<u32>, &mut Vec<f32>)) -> VesselTree {
     let (mut positions, mut parents, mut radii) =
         (tree.positions().to_vec(), tree.parents().to_vec(), tree.radii().to_vec());
@@ -155,7 +155,7 @@ fn edited(tree: &VesselTree, edit: impl FnOnce(&mut Vec<Vec3>, &mut Vec<u32>, &m
     VesselTree::from_arrays(positions, parents, radii).expect("parents come first")
 }
 
-/// Asserts that what is published is what the growth has, node by node.
+/// Asserts that the published vessels equal those of the growth, node by node.
 #[track_caller]
 fn assert_published(world: &World, organ: Entity) {
     let state = world.get::<GrowthState>(organ).expect("an organ has a state");

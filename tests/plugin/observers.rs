@@ -1,4 +1,4 @@
-//! What happens to an organ is heard by observers of that organ, by observers of all, and by readers of messages.
+//! Events of an organ reach observers of that organ, global observers, and readers of messages.
 
 use super::*;
 use bevy_vessels::{
@@ -9,7 +9,7 @@ use bevy_vessels::{
     synthesis::{haemodynamics::BleedingSettings, roots::RootPlacements, units::Scale, wound::Blade},
 };
 
-/// How often an event was heard, by whom.
+/// Number of times that each listener received an event.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq)]
 struct Heard<E: Send + Sync + 'static> {
     on_organ: u32,
@@ -23,7 +23,7 @@ impl<E: Send + Sync + 'static> Default for Heard<E> {
     }
 }
 
-/// Counts an event on an organ, and wherever it happens.
+/// Counts an event on one organ, and on all.
 fn listen<E: EntityEvent>(app: &mut App, organ: Entity) {
     app.init_resource::<Heard<E>>();
     app.add_observer(|_: On<E>, mut heard: ResMut<Heard<E>>| heard.anywhere += 1);

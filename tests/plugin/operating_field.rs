@@ -11,14 +11,14 @@ use bevy_vessels::{
     },
 };
 
-/// An app in which each frame lasts as long as is said.
+/// An app with a fixed duration of frames.
 pub fn timed_app(frame: Duration) -> App {
     let mut app = headless(GrowthBudget::Steps(1000));
     app.insert_resource(TimeUpdateStrategy::ManualDuration(frame));
     app
 }
 
-/// An organ with vessels of its own, each a tree of a kind, without a mesh.
+/// An organ with given trees, each of a kind, without a mesh.
 pub fn organ_of(app: &mut App, trees: &[(VesselKind, &VesselTree)], components: impl Bundle) -> Entity {
     let organ = app.world_mut().spawn((Transform::default(), Visibility::default(), components)).id();
     for &(kind, tree) in trees {
@@ -35,7 +35,7 @@ pub fn tube(length: f32, radius: f32, segments: usize) -> VesselTree {
     VesselTree::from_arrays(positions, parents, vec![radius; segments + 1]).expect("a tube is a tree")
 }
 
-/// A stem along x from 0 to 1 that forks there into two branches along ±y of length 1.
+/// A stem along x from 0 to 1 that forks there into two branches of length 1 along ±y.
 pub fn fork(radius: f32) -> VesselTree {
     let positions = vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
     let radii = vec![radius, radius, 0.8 * radius, 0.8 * radius];
@@ -47,7 +47,7 @@ pub fn blood() -> Perfusion {
     Perfusion { scale: Scale::MILLIMETRES, ..Perfusion::default() }
 }
 
-/// A square blade of an edge length, across a direction.
+/// A square blade with an edge length, perpendicular to a direction.
 pub fn square(center: Vec3, normal: Vec3, size: f32) -> Blade {
     let normal = normal.normalize();
     let half = 0.5 * size * normal.any_orthonormal_vector();
@@ -88,7 +88,7 @@ pub fn open_ends(app: &mut App) -> Vec<OpenEnd> {
     ends
 }
 
-/// A quick growth that can be cut, grown to its end.
+/// A quick growth that can be cut, grown to completion.
 pub fn grown(app: &mut App, components: impl Bundle) -> Entity {
     let organ = spawn(app, quick());
     app.world_mut().entity_mut(organ).insert((Cuttable::default(), components));

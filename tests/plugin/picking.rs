@@ -1,4 +1,4 @@
-//! What a point or a ray finds, against a search of all segments one by one, whatever has been indexed.
+//! The results for points and rays, compared with a search of all segments one by one, at any state of the index.
 
 use super::operating_field::*;
 use super::*;
@@ -20,7 +20,7 @@ use rand::RngExt;
 
 const FRAME: Duration = Duration::from_millis(16);
 
-/// Asks a picker for the nearest place and for the first on a ray.
+/// Queries a picker for the nearest place and for the first on a ray.
 struct Questions {
     nearest: SystemId<In<(Vec3, f32)>, Option<VesselPlace>>,
     ray: SystemId<In<(Ray3d, f32)>, Option<VesselPlace>>,
@@ -56,7 +56,7 @@ fn any_ray(to: Vec3, rng: &mut VesselRng) -> Ray3d {
     Ray3d::new(from, Dir3::new(to - from).expect("points at random are apart"))
 }
 
-/// Branches at random within a cube, thinner than their parents or not, some without length.
+/// Random branches in a cube, some thinner than their parents, some without length.
 fn random_tree(nodes: usize, rng: &mut VesselRng) -> VesselTree {
     let (mut positions, mut parents, mut radii) = (Vec::<Vec3>::new(), Vec::new(), Vec::new());
     for node in 0..nodes {
@@ -70,7 +70,7 @@ fn random_tree(nodes: usize, rng: &mut VesselRng) -> VesselTree {
     VesselTree::from_arrays(positions, parents, radii).expect("parents come first")
 }
 
-/// A place in the world, with another scale along each axis, or mirrored.
+/// A random transform, with a different scale along each axis, or mirrored.
 fn any_transform(rng: &mut VesselRng) -> Transform {
     let turn = Quat::from_scaled_axis(2.0 * any_point(rng));
     let scale = Vec3::from_array(std::array::from_fn(|_| rng.random_range(0.6..1.6)));
@@ -78,16 +78,16 @@ fn any_transform(rng: &mut VesselRng) -> Transform {
     Transform { translation: 0.5 * any_point(rng), rotation: turn, scale: scale * mirrored }
 }
 
-/// A vessel entity, as a search of all segments sees it.
+/// A vessel entity for the search of all segments.
 struct Twin {
     entity: Entity,
     tree: VesselTree,
     to_world: DAffine3,
-    /// What is left of each segment.
+    /// The remaining parts of each segment.
     pieces: Vec<Vec<[f64; 2]>>,
 }
 
-/// All vessel entities, those with the lowest entities first.
+/// All vessel entities, in rising order.
 fn twins(app: &mut App) -> Vec<Twin> {
     app.update();
     let world = app.world_mut();
@@ -108,18 +108,18 @@ fn twins(app: &mut App) -> Vec<Twin> {
 }
 
 impl Twin {
-    /// Where some node is in the world.
+    /// World position of a random node.
     fn any_node(&self, rng: &mut VesselRng) -> Vec3 {
         let node = rng.random_range(0..self.tree.len());
         self.to_world.transform_point3(self.tree.positions()[node].as_dvec3()).as_vec3()
     }
 
-    /// Nodes with their parents, and what is left of their segments.
+    /// Nodes with their parents, and the remaining parts of their segments.
     fn segments(&self) -> impl Iterator<Item = (usize, usize, &[f64; 2])> {
         self.tree.segments().flat_map(|(node, parent)| self.pieces[node].iter().map(move |piece| (node, parent, piece)))
     }
 
-    /// How far the nearest wall is.
+    /// Distance to the nearest wall.
     fn nearest(&self, point: Vec3) -> f64 {
         let (point, scale) = (point.as_dvec3(), self.to_world.matrix3.determinant().abs().cbrt());
         let distance = |(node, parent, &[from, to]): (usize, usize, &[f64; 2])| {
@@ -132,7 +132,8 @@ impl Twin {
         self.segments().map(distance).fold(f64::INFINITY, f64::min)
     }
 
-    /// How far along a ray all walls begin, each shrunk by so much: followed in steps that lead into none of them.
+    /// Distance along a ray to the first wall, with all walls shrunk by a length: found in steps that enter none of
+    /// them.
     fn first(&self, ray: Ray3d, reach: f64, shrunk: f64) -> f64 {
         let to_local = self.to_world.inverse();
         let from = to_local.transform_point3(ray.origin.as_dvec3());
@@ -155,7 +156,7 @@ impl Twin {
         self.segments().map(first).fold(f64::INFINITY, f64::min)
     }
 
-    /// At most how far a point is out of what is left of a segment, in the vessels' space.
+    /// Lower bound of a point's distance to a remaining part of a segment, in the vessels' space.
     fn outside(&self, point: DVec3, [parent, node]: [usize; 2], [from, to]: [f64; 2]) -> f64 {
         let [a, b] = [parent, node].map(|node| self.tree.positions()[node].as_dvec3());
         let radius = self.tree.radii()[node];
@@ -176,7 +177,7 @@ impl Twin {
         ball(low).max(before).max(behind)
     }
 
-    /// Asserts that a place is one of these vessels, where something is left of them.
+    /// Asserts that a place is on a remaining part of these vessels.
     fn check(&self, found: &VesselPlace, world: &World, what: &str) {
         let (node, along) = (found.place.node.index(), f64::from(found.place.along));
         let left = &self.pieces[node];
@@ -195,7 +196,7 @@ fn organ_of_vessels(world: &World, vessels: Entity) -> Option<Entity> {
     world.get::<ChildOf>(vessels).map(ChildOf::parent)
 }
 
-/// Asks about points and rays at random. Returns how many of each found something.
+/// Queries random points and rays. Returns how many of each found something.
 fn check_questions(app: &mut App, questions: &Questions, rng: &mut VesselRng, count: usize, what: &str) -> [usize; 2] {
     const ROOM: f64 = 1e-4;
     let twins = twins(app);
@@ -215,7 +216,7 @@ fn check_questions(app: &mut App, questions: &Questions, rng: &mut VesselRng, co
             None => assert!(nearest > f64::from(reach) - ROOM, "{what}: nothing, not {nearest} within {reach}"),
         }
         let (ray, reach) = (any_ray(near, rng), rng.random_range(0.0..8.0));
-        // What may be met, and what must be.
+        // The nearest possible hit, and the nearest certain one.
         let [may, must] = [-1e-5, 1e-5]
             .map(|shrunk| twins.iter().map(|twin| twin.first(ray, reach.into(), shrunk)).fold(f64::INFINITY, f64::min));
         match questions.ray(app, ray, reach) {
@@ -305,7 +306,7 @@ fn answers_are_complete_while_vessels_move_and_a_large_index_is_under_way() {
     assert!(frames_under_way > 0, "the index of a large tree is not made at once");
 }
 
-/// The first of the nearest places, in the arithmetic of the picker.
+/// The first of the nearest places, in the picker's arithmetic.
 fn nearest_of(tree: &VesselTree, point: Vec3, reach: f32) -> Option<Place> {
     let places = tree.segments().map(|(node, parent)| {
         let [a, b] = [parent, node].map(|node| tree.positions()[node]);
@@ -365,7 +366,7 @@ fn light_passes_through_a_gap() {
     assert_eq!(questions.ray(&mut app, down(5.0), 10.0), None);
     let pieces: Vec<_> = wounds(app.world(), organ, VesselKind::Artery).pieces(NodeId(1)).collect();
     let [before, after] = pieces[..] else { panic!("two pieces, not {pieces:?}") };
-    // Along the axis, out of the gap: each face is met where its piece ends.
+    // Along the axis, out of the gap: each face is hit at the end of its piece.
     for (direction, along) in [(Dir3::X, after.from), (Dir3::NEG_X, before.to)] {
         let found = questions.ray(&mut app, Ray3d::new(Vec3::X * 5.0, direction), 10.0).expect("a face");
         assert!((found.place.along - along).abs() < 1e-6, "{found:?} at {along}");

@@ -1,4 +1,4 @@
-//! Presets from files: loaded, changed while the app runs, and broken.
+//! Presets from files: loaded, changed while the app runs, and invalid.
 
 use super::*;
 use bevy::asset::AssetServer;
@@ -8,7 +8,7 @@ use bevy_vessels::{
 };
 use std::{fs, path::PathBuf};
 
-/// A folder of assets that is gone after the test.
+/// A folder of assets, removed after the test.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -29,7 +29,7 @@ impl Drop for Folder {
     }
 }
 
-/// The preset of [`quick`], with other numbers of steps.
+/// The preset of [`quick`], with another number of steps.
 fn text(steps: u32) -> String {
     let mut vasculature = quick();
     vasculature.generator.colonization_mut().expect("colonization").steps = steps;
@@ -71,7 +71,7 @@ fn an_organ_grows_by_its_preset_and_anew_when_the_file_changes() {
     assert_eq!(app.world().get::<Vasculature>(organ).map(|vasculature| vasculature.seed), Some(8), "the seed stays");
     run_until(&mut app, "nine steps", |world| progress(world, organ).is_finished() && progress(world, organ).step == 9);
 
-    // A file that has become a bad one changes nothing.
+    // A file that becomes invalid changes nothing.
     let mut failed = MessageCursor::default();
     folder.write("organ.vessels.ron", "(generator: Sorcery)");
     app.world().resource::<AssetServer>().reload("organ.vessels.ron");
@@ -98,7 +98,7 @@ fn a_change_of_the_asset_itself_counts_too() {
     let changed = PresetAsset(Preset::from_ron(&text(5)).expect("a preset"));
     app.world_mut().resource_mut::<Assets<PresetAsset>>().insert(&handle, changed).expect("a living handle");
     run_until(&mut app, "five steps", |world| steps(world, organ) == Some(5));
-    // The same preset once more is no change.
+    // The same preset again is no change.
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
     app.world_mut().get_mut::<VesselPreset>(organ).expect("a preset").set_changed();
     app.update();
@@ -137,7 +137,7 @@ fn files_that_are_no_presets_say_why_and_leave_other_organs_alone() {
         assert!(told.contains(file) && told.contains(message), "{file}: {told}");
         assert!(app.world().get::<Vasculature>(organ).is_none());
     }
-    // Asked for after it failed, it is told as well.
+    // Requested after it failed, the failure is reported, too.
     let late = spawn_with_preset(&mut app, "broken.vessels.ron");
     run_until(&mut app, "a failure", |world| {
         drain(world, &mut cursor).iter().any(|failure: &GrowthFailed| failure.organ == late)

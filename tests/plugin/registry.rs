@@ -1,4 +1,4 @@
-//! All that users touch is known to reflection: inspectors, remote tools and scenes.
+//! All types that users touch are registered for reflection: for inspectors, remote tools and scenes.
 
 use super::*;
 use bevy::{
@@ -8,7 +8,7 @@ use bevy::{
 use bevy_vessels::plugin::{Cuttable, JobSettings, Perfusion, VesselAppearance};
 use std::{fs, path::Path};
 
-/// What reflection does not know, and why.
+/// Types that are not registered, and why.
 const EXCEPTIONS: &[(&str, &str)] = &[
     ("CuttableVessels", "a queue of requests, empty between frames"),
     ("GrowthState", "a growth under way, with its tissue: regrown from the Vasculature"),
@@ -80,7 +80,7 @@ fn every_component_resource_and_message_of_the_public_interface_is_registered() 
     }
 }
 
-/// What a registered type cannot do by reflection, though it derives the trait.
+/// Traits that a registered type derives but does not reflect.
 fn lacking(name: &str, derives: &[String], registration: &TypeRegistration) -> Vec<String> {
     let has = |what: &str| match what {
         "Component" => registration.data::<ReflectComponent>().is_some(),

@@ -1,4 +1,4 @@
-//! Organs saved in a Bevy scene and loaded again, into a fresh app and by clones.
+//! Organs that are saved in a Bevy scene and loaded into a fresh app, and clones.
 
 use super::*;
 use bevy::{
@@ -19,7 +19,7 @@ use bevy_vessels::{
 };
 use serde::de::DeserializeSeed;
 
-/// An organ that bleeds for ever once it is cut.
+/// An organ that never stops bleeding once it is cut.
 fn organ_with_blood(app: &mut App, vasculature: Vasculature) -> Entity {
     let bleeding = BleedingSettings { clotting: None, ..default() };
     let perfusion = Perfusion { scale: Scale::CENTIMETRES, bleeding, ..default() };
@@ -30,7 +30,7 @@ fn organ_with_blood(app: &mut App, vasculature: Vasculature) -> Entity {
     organ
 }
 
-/// Cuts an organ open, and clamps, ties and seals some of its vessels.
+/// Cuts an organ, and clamps, ties and seals some of its vessels.
 fn operate(app: &mut App, organ: Entity) {
     let arteries = vessel_entity(app.world(), organ, VesselKind::Artery).expect("arteries");
     let mut door = app.world_mut().resource_mut::<CuttableVessels>();
@@ -48,7 +48,7 @@ fn operate(app: &mut App, organ: Entity) {
     });
 }
 
-/// All entities, as the text of a scene.
+/// All entities, as a scene's text.
 fn save(world: &mut World) -> String {
     let entities: Vec<Entity> = world.query_filtered::<Entity, With<Transform>>().iter(world).collect();
     save_entities(world, entities)
@@ -60,7 +60,7 @@ fn save_entities(world: &World, entities: Vec<Entity>) -> String {
     scene.serialize(&registry).expect("a scene can be written")
 }
 
-/// Reads a scene into an app, and gives every organ its mesh again. Gives the organs.
+/// Reads a scene into an app, gives every organ its mesh again, and returns the organs.
 fn load(app: &mut App, scene: &str) -> Vec<Entity> {
     let registry = app.world().resource::<AppTypeRegistry>().clone();
     let mut server = app.world().resource::<AssetServer>().clone();
@@ -84,7 +84,7 @@ fn load(app: &mut App, scene: &str) -> Vec<Entity> {
     organs
 }
 
-/// All that may be seen of an organ's wounds and blood, whatever its entities are.
+/// The observable state of an organ's wounds and blood, without entity ids.
 #[derive(Clone, Debug, PartialEq)]
 struct Condition {
     trees: Vec<(VesselKind, VesselTree, Vec<u32>)>,
@@ -108,7 +108,7 @@ fn condition(world: &World, organ: Entity) -> Condition {
     condition
 }
 
-/// Asserts that there is an entity for each open end of the organs, and no other; and no vessel entity too many.
+/// Asserts that the organs have an entity for each open end and no others, and no surplus vessel entity.
 #[track_caller]
 fn assert_no_ghosts(world: &mut World, organs: &[Entity]) {
     let mut known = Vec::new();
@@ -149,7 +149,7 @@ fn wait_for_vessels(app: &mut App, organ: Entity, nodes: usize) {
     });
 }
 
-/// Asserts that an organ can be cut, and healed altogether.
+/// Asserts that an organ can be cut and completely healed.
 #[track_caller]
 fn assert_can_be_cut(app: &mut App, organ: Entity) {
     let mut operations = MessageCursor::default();
@@ -302,7 +302,7 @@ fn given_vessels_come_back_with_their_wounds() {
     fresh.update();
     assert_eq!(condition(fresh.world(), loaded), before);
     assert_no_ghosts(fresh.world_mut(), &[loaded]);
-    // A tree that was changed in the file is another one.
+    // A tree that was changed in the file is another tree.
     let changed = scene.replace("0.05", "0.06");
     assert_ne!(changed, scene);
     let [other] = load(&mut fresh, &changed)[..] else { panic!("one organ") };

@@ -1,5 +1,5 @@
-//! A generator that is not of the crate, splits segments and grows more than two kinds: what it replaces is followed or
-//! cleared by everything that holds on to a tree.
+//! A generator outside the crate, which splits segments and grows more than two kinds: all data that refers to a
+//! replaced tree follows it or is cleared.
 
 use super::operating_field::*;
 use super::*;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 const FRAME: Duration = Duration::from_millis(16);
 
-/// Kinds that the splitter grows: not those of colonization.
+/// Kinds that the splitter grows, unlike those of colonization.
 const KINDS: [VesselKind; 3] = [VesselKind::Artery, VesselKind::PortalVein, VesselKind::Duct];
 
 /// Grows a straight vessel of each kind through the organ, and splits its longest segment in each step.
@@ -113,7 +113,7 @@ impl Growth for Splitting {
     }
 }
 
-/// An organ that the splitter has started on, and that waits.
+/// An organ on which the splitter has started, and which waits.
 fn paused(app: &mut App, components: impl Bundle) -> Entity {
     let at = |x: f32| RootPlacement::Nearest(vec![Vec3::new(x, 0.5, 0.0)]);
     let roots = RootPlacements {

@@ -1,4 +1,4 @@
-//! One organ in metres, in millimetres and as a toy: its vessels, and what they bleed.
+//! One organ in metres, in millimetres and as a toy: its vessels, and their blood loss.
 
 use super::operating_field::*;
 use super::*;
@@ -10,7 +10,7 @@ use bevy_vessels::{
 const FRAME: Duration = Duration::from_millis(16);
 /// Radius of the organ, in metres.
 const SIZE: f64 = 0.05;
-/// Frames that it bleeds.
+/// Number of frames of bleeding.
 const FRAMES: u32 = 30;
 
 /// Units of the organ's mesh in a metre: metres, millimetres, and a toy 50 units across.
@@ -20,7 +20,7 @@ fn blood_in(units: f64) -> Perfusion {
     Perfusion { scale: Scale::from_metres(1.0 / units).expect("a scale"), ..Perfusion::default() }
 }
 
-/// Cuts an organ through the middle, and gives what it has lost a while later.
+/// Cuts an organ through the middle, and returns its loss a while later.
 fn bled(app: &mut App, organ: Entity, radius: f32) -> BloodLoss {
     app.update();
     cut(app, square(Vec3::splat(0.1 * radius), Vec3::new(0.2, 1.0, 0.1), 3.0 * radius));
@@ -46,7 +46,7 @@ fn an_organ_grows_and_bleeds_alike_in_any_unit() {
     assert!(nodes.iter().all(|&nodes| nodes > 1000), "{nodes:?} are too few to tell");
     for (other_nodes, other_loss) in others {
         for (one, other) in nodes.iter().zip(other_nodes) {
-            // Rounding changes which way single vessels go.
+            // Rounding changes the paths of single vessels.
             let ratio = other as f64 / *one as f64;
             assert!((ratio - 1.0).abs() < 0.08, "{other} nodes, {one} in metres");
         }
@@ -55,7 +55,7 @@ fn an_organ_grows_and_bleeds_alike_in_any_unit() {
     }
 }
 
-/// With the same tree, nothing but the unit differs.
+/// With the same tree, only the unit differs.
 #[test]
 fn a_tree_bleeds_the_same_in_any_unit() {
     let mut organ_in_metres = timed_app(FRAME);

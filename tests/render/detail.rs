@@ -1,4 +1,4 @@
-//! Levels of detail: nothing changes where a chunk changes its mesh, and vessels keep what they cover.
+//! Levels of detail: the picture doesn't change when a chunk changes its mesh, and vessels keep their covered area.
 
 use crate::{stage::*, tree};
 use bevy::prelude::*;
@@ -18,7 +18,7 @@ fn fence(count: usize, radius: f32, length: f32) -> VesselTree {
     tree(&nodes)
 }
 
-/// The level at which an organ's only chunk was drawn last.
+/// The last level of detail of an organ's only chunk.
 fn level(stage: &Stage, organ: Entity) -> usize {
     let chunks = stage.chunks(organ);
     assert_eq!(chunks.len(), 1);
@@ -30,10 +30,10 @@ fn scaled(stage: &mut Stage, organ: Entity, scale: f32) -> Picture {
     stage.picture()
 }
 
-/// Draws vessels at sizes between near and far, each from two levels of detail where a chunk may have either, and gives both
+/// Draws vessels at sizes from near to far, with both levels of detail where a chunk may have either, and returns both
 /// pictures for each change of level.
 fn changes_of_level(stage: &mut Stage) -> Vec<[Picture; 2]> {
-    // a unit is a pixel; chunks get coarser a little below a limit and finer at it, so between the two both are drawn
+    // a unit is a pixel; chunks get coarser a little below a limit and finer at it, so both levels occur in between
     let organ = stage.spawn(VesselKind::Artery, &fence(40, 0.1, 4.0));
     let mut changes = Vec::new();
     let mut scale = 80.0;
@@ -64,7 +64,7 @@ fn a_change_of_level_is_not_to_be_seen() {
 #[test]
 fn a_change_of_level_is_hardly_seen_in_shadows() {
     on_stage("levels in shadow", |stage| {
-        // a shadow map may be finer than the picture: shapes that are the same here differ there by parts of a pixel
+        // a shadow map may be finer than the picture: shapes that are equal here differ there by parts of a pixel
         for [before, after] in changes_of_level(stage) {
             let outlines = (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y)));
             let moved = outlines.filter(|&(x, y)| before.is_vessel(x, y) != after.is_vessel(x, y)).count();
@@ -92,7 +92,7 @@ fn near_vessels_have_all_their_corners_and_far_ones_few() {
 #[test]
 fn vessels_thinner_than_a_pixel_cover_what_they_should() {
     on_stage("coverage", |stage| {
-        // a thousand segments, whose widths together are the share of the picture that is to be covered
+        // a thousand segments, whose total width is the expected covered share of the picture
         for radius in [0.02, 0.01, 0.005, 0.002] {
             let organ = stage.spawn(VesselKind::Artery, &fence(1000, radius, 60.0));
             let covered = scaled(stage, organ, 1.0).vessel_pixels() as f32;

@@ -1,7 +1,7 @@
 //! A flight from afar to just above a colon with all its vessels, and back the same way.
 //!
-//! At the same place a chunk may be drawn at two levels of detail, a coarser one on the way there and a finer one on the way
-//! back: the two pictures show what a change of level changes, and nothing else.
+//! At the same place a chunk may be drawn at two levels of detail, a coarser one on the way there and a finer one on
+//! the way back: the two pictures differ only by the change of level.
 
 use crate::stage::*;
 use bevy::{
@@ -23,10 +23,10 @@ use bevy_vessels::{
 /// Pixels of a picture.
 const PICTURE: UVec2 = UVec2::new(200, 150);
 
-/// What is seen at a place.
+/// The view at a place.
 struct View {
     picture: Image,
-    /// Of all chunks, in the order of the entities.
+    /// Levels of all chunks, in the order of the entities.
     levels: Vec<usize>,
 }
 
@@ -50,8 +50,8 @@ fn spawn_colon(stage: &mut Stage) -> (Colon, Transform) {
     (colon, place)
 }
 
-/// Where the camera stands, above the transverse colon: `count` places at distances from the wall from the first to the
-/// second, nearer by the same share each time. The organ is one unit large.
+/// Camera positions above the transverse colon: `count` places at distances from the wall from the first to the second,
+/// in a geometric series. The organ is one unit large.
 fn places(colon: &Colon, organ: &Transform, [far, near]: [f32; 2], count: usize) -> Vec<Transform> {
     let front = (colon.front.eye - colon.front.target).normalize();
     let target = organ.transform_point(colon.centre_line[colon.centre_line.len() / 2]);
@@ -95,12 +95,12 @@ fn fly_there_and_back(stage: &mut Stage, distances: [f32; 2], count: usize) -> V
     there.into_iter().zip(back).map(|(there, back)| [there, back]).collect()
 }
 
-/// Number of chunks that are drawn at another level.
+/// Number of chunks drawn at different levels.
 fn switched([a, b]: &[View; 2]) -> usize {
     a.levels.iter().zip(&b.levels).filter(|(a, b)| a != b).count()
 }
 
-/// Sum over all pixels of what their most different channel differs by.
+/// Sum over all pixels of the largest difference of a channel.
 fn change(a: &Image, b: &Image) -> u64 {
     let [a, b] = [a, b].map(|image| image.data.as_deref().expect("a picture on the CPU").chunks(4));
     let most = |(a, b): (&[u8], &[u8])| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);

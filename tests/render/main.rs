@@ -1,6 +1,6 @@
-//! Draws small pictures of known vessels and looks at their pixels.
+//! Draws small pictures of known vessels and checks their pixels.
 //!
-//! Where there is no graphics adapter every test skips, and says so; with `BEVY_VESSELS_REQUIRE_GPU=1` it fails instead.
+//! Without a graphics adapter every test is skipped with a message; with `BEVY_VESSELS_REQUIRE_GPU=1` it fails instead.
 //! A software driver will do. With `BEVY_VESSELS_PICTURES=FOLDER` the pictures are kept.
 
 #![cfg(feature = "render")]
@@ -39,12 +39,12 @@ fn tree(nodes: &[([f32; 3], u32, f32)]) -> VesselTree {
     VesselTree::from_arrays(positions, parents, radii).expect("a well-formed tree")
 }
 
-/// One horizontal segment through the middle of the picture, 40 pixels long and 8 to either side thick.
+/// One horizontal segment through the middle of the picture, 40 pixels long with a radius of 8.
 fn bar() -> VesselTree {
     bar_of(8.0, 20.0)
 }
 
-/// A horizontal segment of a radius through the middle of the picture, reaching as far as `half` to either side.
+/// A horizontal segment with a radius through the middle of the picture, extending `half` to either side.
 fn bar_of(radius: f32, half: f32) -> VesselTree {
     tree(&[([-half, 0.0, 0.0], NO_PARENT, radius), ([half, 0.0, 0.0], 0, radius)])
 }
@@ -60,7 +60,7 @@ fn comb(count: usize) -> VesselTree {
     tree(&nodes)
 }
 
-/// The same tree elsewhere.
+/// The same tree, moved.
 fn moved(tree: &VesselTree, by: Vec3) -> VesselTree {
     let positions = tree.positions().iter().map(|&at| at + by).collect();
     VesselTree::from_arrays(positions, tree.parents().to_vec(), tree.radii().to_vec()).expect("a well-formed tree")
@@ -76,7 +76,7 @@ fn a_segment_is_where_it_belongs_and_as_thick_as_it_says() {
             assert!(picture.is_background(x, y), "vessel at {x}, {y}");
         }
         assert_near(picture.height_at(64), 16, 2);
-        // the flat end at the root has a shallow cap, the far end a round one
+        // the end at the root has a shallow cap, the far end a round one
         let row = picture.width_at(64);
         assert!((44..=58).contains(&row), "{row} pixels long with both ends");
         assert!(picture.is_vessel(64 + 26, 64), "the far end is round and reaches a radius beyond the node");
@@ -142,7 +142,7 @@ fn growth_appears_through_range_writes_and_larger_buffers() {
         let full = comb(CHUNK);
         let organ = stage.spawn(VesselKind::Artery, &comb(2));
         let before = stage.picture();
-        // half of the comb is one chunk, all of it two: the second picture needs a larger buffer and a new chunk
+        // half of the comb is one chunk, the whole comb two: the second picture needs a larger buffer and a new chunk
         stage.change(organ, &full, 4..full.len());
         let after = stage.picture();
         assert_eq!(stage.chunks(organ).len(), 2);
@@ -159,7 +159,7 @@ fn only_marked_ranges_are_written_again() {
     on_stage("ranges", |stage| {
         let organ = stage.spawn(VesselKind::Artery, &comb(CHUNK));
         let before = stage.picture();
-        // everything moved out of view, but only the second half was said to have changed
+        // everything moved out of view, but only the second half was marked as changed
         stage.change(organ, &moved(&comb(CHUNK), 500.0 * Vec3::X), CHUNK..2 * CHUNK);
         let after = stage.picture();
         assert!(before.is_vessel(64 - 40, 64) && before.is_vessel(64 + 40, 64));
@@ -173,7 +173,7 @@ fn scattered_changes_reach_their_slots_and_no_others() {
     on_stage("scattered", |stage| {
         let organ = stage.spawn(VesselKind::Artery, &comb(28));
         let before = stage.picture();
-        // all teeth are moved out of view, and every third is said to have changed
+        // all teeth moved out of view, and every third was marked as changed
         let changed = (0..28).filter(|tooth| tooth % 3 == 1).flat_map(|t| [2 * t, 2 * t + 1]);
         stage.change(organ, &moved(&comb(28), 500.0 * Vec3::X), changed);
         let after = stage.picture();
@@ -315,7 +315,7 @@ fn deferred_rendering_draws_the_same() {
 #[test]
 fn boxes_follow_growth_so_that_nothing_in_view_is_culled() {
     on_stage("culling", |stage| {
-        // the chunk begins far out of view; what grows into view last must be drawn
+        // the chunk begins far out of view; the last segments, which grow into view, must be drawn
         let far = [([900.0, 0.0, 0.0], NO_PARENT, 1.0), ([910.0, 0.0, 0.0], 0, 1.0)];
         let organ = stage.spawn(VesselKind::Artery, &tree(&far));
         assert_eq!(stage.picture().vessel_pixels(), 0);
@@ -324,7 +324,7 @@ fn boxes_follow_growth_so_that_nothing_in_view_is_culled() {
         grown.extend([([-10.0, 0.0, 0.0], NO_PARENT, 8.0), ([10.0, 0.0, 0.0], 2, 8.0)]);
         stage.change(organ, &tree(&grown), 2..4);
         assert!(stage.picture().is_vessel(64, 64));
-        // beyond the node itself by its radius: a segment whose axis is out of view, but whose side is in
+        // a segment whose axis is out of view, but whose side is in view
         let beside = [([-30.0, 74.0, 0.0], NO_PARENT, 20.0), ([30.0, 74.0, 0.0], 0, 20.0)];
         stage.replace(organ, &tree(&beside));
         assert!(stage.picture().is_vessel(64, 3), "a vessel's side at the edge of the picture");
@@ -378,7 +378,7 @@ fn without_a_renderer_vessels_are_kept_and_nothing_is_drawn() {
     assert!(!app.world().contains_resource::<SegmentLimits>());
 }
 
-/// The same outline, and about the same colours: lighting differs a little between ways of rendering.
+/// The same outline, and about the same colours: lighting differs a little between render methods.
 #[track_caller]
 fn assert_looks_like(picture: &Picture, expected: &Picture) {
     for (x, y) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y))) {

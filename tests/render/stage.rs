@@ -1,6 +1,6 @@
-//! One app with one camera for all tests: a device costs seconds on a software driver.
+//! One app with one camera for all tests, since creating a device takes seconds with a software driver.
 //!
-//! The app lives on a thread of its own, which tests hand their work to, one after the other.
+//! The app lives on its own thread, to which tests send their work, one after the other.
 
 use crate::headless::{
     HOW_TO_GET_PICTURES, OffscreenPlugin, OffscreenTarget, PipelinesReady, find_adapter, headless_plugins,
@@ -34,17 +34,17 @@ use std::{
     thread,
 };
 
-/// Pixels along each side of a picture. The camera sees as many units, so lengths can be read off in pixels.
+/// Pixels along each side of a picture. The camera sees as many units, so lengths equal pixels.
 pub const SIZE: usize = 128;
 
 const BACKGROUND: Color = Color::srgb(0.8, 0.8, 0.8);
 
 type Work = Box<dyn FnOnce(&mut Stage) + Send>;
 type Outcome = Result<(), Box<dyn Any + Send>>;
-/// A test's name, what it does, and where it waits for the end.
+/// A test's name, its work, and the sender for its outcome.
 type Job = (&'static str, Work, Sender<Outcome>);
 
-/// Runs a test on the stage, which is empty before and after; skips it where nothing can be drawn.
+/// Runs a test on the stage, which is empty before and after; skips it if nothing can be drawn.
 pub fn on_stage(name: &'static str, test: impl FnOnce(&mut Stage) + Send + 'static) {
     static STAGE: OnceLock<Option<Sender<Job>>> = OnceLock::new();
     let stage = STAGE.get_or_init(|| {
@@ -55,7 +55,7 @@ pub fn on_stage(name: &'static str, test: impl FnOnce(&mut Stage) + Send + 'stat
             for (name, test, done) in work {
                 stage.begin(name);
                 let outcome = catch_unwind(AssertUnwindSafe(|| test(&mut stage)));
-                // the test has gone away when sending fails, and nobody waits
+                // if sending fails, the test has ended, and nothing waits
                 let _ = done.send(outcome);
             }
         });
@@ -70,7 +70,7 @@ pub fn on_stage(name: &'static str, test: impl FnOnce(&mut Stage) + Send + 'stat
     let (done, outcome) = channel();
     stage.send((name, Box::new(test), done)).expect("the stage lives as long as the tests");
     if let Err(panic) = outcome.recv().expect("the stage answers") {
-        // the stage's own output belongs to the test that opened it, so the message is said again here
+        // the stage's output belongs to the test that opened it, so the message is repeated here
         match panic.downcast::<String>() {
             Ok(message) => panic!("{message}"),
             Err(panic) => resume_unwind(panic),
@@ -78,7 +78,7 @@ pub fn on_stage(name: &'static str, test: impl FnOnce(&mut Stage) + Send + 'stat
     }
 }
 
-/// Marks what a test put on the stage.
+/// Marks entities that a test put on the stage.
 #[derive(Component)]
 struct Prop;
 
@@ -141,7 +141,7 @@ impl Stage {
         world.get_mut::<Camera>(self.camera).expect("a camera").is_active = true;
         (self.name, self.pictures) = (name, 0);
         self.set_shadows(true);
-        // dropped handles free their assets a frame later
+        // dropped handles free their assets one frame later
         self.app.update();
         self.app.update();
     }
@@ -187,7 +187,7 @@ impl Stage {
         self.app.world().get::<OrganVessels>(organ).expect("an organ with vessels").entities()[0]
     }
 
-    /// Gives an organ another tree in place of its own.
+    /// Replaces an organ's tree.
     pub fn replace(&mut self, organ: Entity, tree: &VesselTree) {
         let vessels = self.vessels(organ);
         let mut vessels = self.app.world_mut().entity_mut(vessels);
@@ -195,7 +195,7 @@ impl Stage {
         vessels.insert(Vessels::from_tree(kind, tree, &[]));
     }
 
-    /// Changes an organ's tree, whose nodes keep their parents, and says that it did so at some nodes, be it true or not.
+    /// Changes an organ's tree, whose nodes keep their parents, and marks some nodes as changed, rightly or not.
     pub fn change(&mut self, organ: Entity, tree: &VesselTree, said: impl IntoIterator<Item = usize>) {
         let vessels = self.vessels(organ);
         let mut vessels = self.app.world_mut().entity_mut(vessels);
@@ -204,7 +204,7 @@ impl Stage {
         vessels.get_mut::<ChangeLog>().expect("required by vessels").mark(said);
     }
 
-    /// Lets lights cast shadows, or not.
+    /// Turns shadows of lights on or off.
     pub fn set_shadows(&mut self, cast: bool) {
         let world = self.app.world_mut();
         for mut light in world.query::<&mut DirectionalLight>().iter_mut(world) {
@@ -220,13 +220,13 @@ impl Stage {
         self.app.world_mut().entity_mut(organ).insert(transform);
     }
 
-    /// Lets another camera draw, to an image of its own, and this one rest until the test ends.
+    /// Draws with another camera, to its own image, and disables this one until the test ends.
     pub fn use_camera(&mut self, camera: impl Bundle) -> Entity {
         self.app.world_mut().get_mut::<Camera>(self.camera).expect("a camera").is_active = false;
         self.app.world_mut().spawn((Prop, camera)).id()
     }
 
-    /// Draws for a while with further components on the camera.
+    /// Draws with further components on the camera for a while.
     pub fn with_on_camera<B: Bundle>(&mut self, components: B, draw: impl FnOnce(&mut Self)) {
         self.app.world_mut().entity_mut(self.camera).insert(components);
         let outcome = catch_unwind(AssertUnwindSafe(|| draw(self)));
@@ -256,15 +256,15 @@ impl Stage {
         [world.resource::<Assets<ShaderBuffer>>().len(), world.resource::<Assets<SegmentMaterial>>().len()]
     }
 
-    /// What the camera sees now.
+    /// The present picture of the camera.
     pub fn picture(&mut self) -> Picture {
         let target = self.app.world().resource::<OffscreenTarget>().0.clone();
         Picture(self.picture_of(target))
     }
 
-    /// What is drawn to an image now.
+    /// The present picture in an image.
     pub fn picture_of(&mut self, target: Handle<Image>) -> Image {
-        // one frame queues shaders that weren't needed before; their files load in the background
+        // one frame queues shaders that were not needed before; their files load in the background
         self.app.update();
         for _ in 0..200 {
             if self.app.world().resource::<PipelinesReady>().0 {
@@ -286,7 +286,7 @@ impl Stage {
         panic!("no picture after 200 frames");
     }
 
-    /// Keeps a picture for people, where a folder is given.
+    /// Saves a picture, if a folder is given.
     fn keep(&mut self, image: &Image) {
         self.pictures += 1;
         if let Ok(folder) = std::env::var("BEVY_VESSELS_PICTURES") {
@@ -331,7 +331,7 @@ impl Picture {
         self.at(x, y).map(f32::from).iter().sum()
     }
 
-    /// Pixels that differ between two pictures, by more than a channel's last bit.
+    /// Number of pixels that differ between two pictures by more than a channel's last bit.
     pub fn differing(&self, other: &Self) -> usize {
         let pixels = (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y)));
         let differ =

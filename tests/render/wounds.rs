@@ -1,4 +1,4 @@
-//! Gaps of severed vessels are seen, and are gone once they are undone.
+//! Gaps of severed vessels are visible, and disappear with undo.
 
 use crate::{
     bar_of, comb,
@@ -10,7 +10,7 @@ use bevy_vessels::{
     synthesis::{tree::VesselKind, wound::Blade},
 };
 
-/// Lets an organ be cut, and draws it.
+/// Makes an organ cuttable, and draws it.
 fn whole(stage: &mut Stage, organ: Entity) -> Picture {
     stage.app.world_mut().entity_mut(organ).insert(Cuttable::default());
     stage.picture()
@@ -36,7 +36,7 @@ fn a_severed_vessel_shows_its_gap_until_the_cut_is_undone() {
         assert!(before.is_vessel(64, 64));
         let cut = operate(stage, |vessels| vessels.cut(slash(Vec3::ZERO, Vec3::Y)));
         let gap = (0..SIZE).filter(|&x| x > 20 && x < 108 && cut.is_background(x, 64)).count();
-        // Either end draws back by one and a half radii.
+        // Either end retracts by one and a half radii.
         assert!((7..=11).contains(&gap), "a gap of {gap} pixels");
         assert!(cut.is_background(64, 64) && cut.is_vessel(54, 64) && cut.is_vessel(74, 64));
         let undone = operate(stage, CuttableVessels::undo);

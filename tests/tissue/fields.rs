@@ -155,7 +155,7 @@ fn stages_follow_each_other() -> Outcome {
     let near = whole.closest_point(Vec3::new(0.5, 0.0, 0.3));
     assert_eq!((near.position, near.normal), (Vec3::X * 0.5, Vec3::Z));
     samples(whole, 100, 1);
-    // A tissue without stages is in force itself.
+    // A tissue without stages is always in force.
     assert_eq!(disc.at_step(7).extent(), disc.extent());
     let staged = Arc::new(staged);
     let field = DensityField::function(|_| 0.5);

@@ -1,4 +1,4 @@
-//! Tissues against their oracles: analytic moments, brute force, and meshes whose volume is known.
+//! Tissues against oracles: analytic moments, brute force, and meshes of known volume.
 
 mod fields;
 mod no_go;
@@ -117,7 +117,7 @@ fn assert_closest(tissue: &dyn Tissue, seed: u64) {
         let distance = found.position.distance(query);
         let brute = points.iter().map(|p| p.distance(query)).fold(f32::INFINITY, f32::min);
         assert!(distance <= brute + 1e-5 * size, "{tissue:?}: {distance} from {query}, but a sample is {brute} away");
-        // On the way to the nearest point there is no other point of the tissue.
+        // No point of the tissue is on the way to the nearest one.
         let before = query.lerp(found.position, 0.9);
         assert!(distance < 1e-3 * size || !tissue.contains(before), "{tissue:?}: {before} is nearer to {query}");
         assert!(found.normal == Vec3::ZERO || found.normal.is_normalized());
@@ -255,7 +255,7 @@ fn closest_points_of_mesh_surfaces_are_closest() -> Outcome {
     Ok(())
 }
 
-/// A ball of unit radius as a mesh, by longitude and latitude, each triangle with vertices of its own.
+/// A ball of unit radius as a mesh, by longitude and latitude, with separate vertices for each triangle.
 fn ball_soup(rings: u32, inward: bool) -> Result<TriangleMesh, Box<dyn std::error::Error>> {
     let at = |i: u32, j: u32| {
         let (polar, around) = (PI * i as f32 / rings as f32, PI * (j % (2 * rings)) as f32 / rings as f32);

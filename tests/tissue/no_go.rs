@@ -1,4 +1,4 @@
-//! No-go regions: no attraction point is born in one, no node is placed there, and vessels go round.
+//! No-go regions: no attraction point is born in one, no node is placed there, and vessels grow around it.
 
 use super::{Outcome, ball_soup};
 use bevy_math::Vec3;
@@ -31,7 +31,7 @@ fn regions(regions: impl Into<Vec<NoGoRegion>>) -> TissuePaint {
     no_go(NoGo { regions: regions.into(), ..NoGo::default() })
 }
 
-/// Vertices within the region, and what they forbid by the nearest corner: too much or too little by an edge at most.
+/// Vertices in the region, and the points that they forbid by the nearest corner: wrong by at most an edge.
 fn painted(mesh: &TriangleMesh) -> TissuePaint {
     let vertices = mesh.positions().iter().map(|&position| REGION.contains(position)).collect();
     no_go(NoGo { vertices: Some(vertices), ..NoGo::default() })
@@ -41,7 +41,7 @@ fn settings() -> ColonizationSettings {
     ColonizationSettings { steps: 70, samples: 800, ..ColonizationSettings::default() }
 }
 
-/// Grows step by step, and checks after each that nothing is where it is forbidden.
+/// Grows step by step, and checks after each that nothing is at a forbidden point.
 fn grow(tissue: &Arc<dyn Tissue>, roots: &Roots, seed: u64, forbidden: impl Fn(Vec3) -> bool) -> Colonization {
     grow_by(settings().fit(tissue.extent()), tissue, roots, seed, forbidden)
 }
@@ -75,7 +75,7 @@ fn no_drain_is_born_and_no_node_is_placed_in_a_region() -> Outcome {
         let prepared = prepared(mode)?;
         let tissue = prepared.painted(&regions([REGION]))?;
         for seed in 0..3 {
-            // Without the region, vessels are there: the test can fail.
+            // Without the region, vessels grow there, so the test can fail.
             let free = grow(prepared.tissue(), &Roots::default(), seed, |_| false);
             let there = free.tree(VesselKind::Artery).positions().iter().filter(|&&node| REGION.contains(node)).count();
             let growth = grow(&tissue, &Roots::default(), seed, |point| REGION.contains(point));
@@ -92,7 +92,7 @@ fn painted_vertices_forbid_what_is_nearest_to_them() -> Outcome {
     for mode in modes() {
         let tissue = prepared(mode)?.painted(&painted(&mesh))?;
         for seed in 0..2 {
-            // On the way to the middle the same part of the surface is nearest. An edge is 0.1 long.
+            // Towards the middle the same part of the surface is nearest. An edge is 0.1 long.
             let below = |point: Vec3, radius: f32| point.length() > 0.2 && point.normalize().distance(Vec3::X) < radius;
             let growth = grow(&tissue, &Roots::default(), seed, |point| below(point, 0.38));
             let near = growth.tree(VesselKind::Artery).positions().iter().filter(|&&node| below(node, 0.68)).count();
@@ -139,7 +139,7 @@ fn assert_no_segment_crosses(tree: &VesselTree, region: NoGoRegion) {
     }
 }
 
-/// A band all around the organ leaves two parts, each with roots of its own.
+/// A band all around the organ leaves two parts, each with its own roots.
 #[test]
 fn parts_that_a_region_cuts_off_have_roots_of_their_own() -> Outcome {
     let band = NoGoRegion::Cuboid { center: Vec3::ZERO, size: Vec3::new(0.4, 4.0, 4.0) };
@@ -163,7 +163,7 @@ fn guides_and_roots_keep_out() -> Outcome {
     for mode in modes() {
         let paint = TissuePaint { guides: vec![guide.clone()], ..regions([REGION]) };
         let tissue = prepared(mode)?.painted(&paint)?;
-        // The guide begins where no vessel may be: the root is elsewhere.
+        // The guide begins where no vessel may be, so the root is elsewhere.
         grow(&tissue, &Roots::default(), 4, |point| REGION.contains(point));
         let place = |artery: RootPlacement| {
             let roots = Roots::from(RootPlacements { artery, ..RootPlacements::default() });

@@ -1,4 +1,4 @@
-//! Where tissues come from, and what is painted on them.
+//! Sources of tissues, and paint on them.
 
 use super::{Outcome, ball_soup, grid, rng, samples};
 use bevy_math::{UVec3, Vec3};
@@ -105,14 +105,14 @@ fn images_stand_upright_and_volumes_from_their_lowest_corner() -> Outcome {
         let data = SourceData { image: Some(Arc::new(image.clone())), ..SourceData::default() };
         Ok(Arc::clone(TissueSource::from(settings).prepare(&data)?.tissue()))
     };
-    // Two columns, three rows; the left of the top row alone is white.
+    // Two columns, three rows; only the left of the top row is white.
     let picture = TissueImage { size: UVec3::new(2, 3, 1), values: vec![1.0, 0.0, 0.4, 0.0, f32::NAN, 0.0] };
     let top = of(ImageTissue { spacing: Vec3::new(1.0, 2.0, 9.0), ..ImageTissue::default() }, &picture)?;
     assert_eq!(top.extent(), Extent::Area(2.0));
     assert!(top.contains(Vec3::new(0.5, 5.0, 0.0)) && !top.contains(Vec3::new(0.5, 1.0, 0.0)));
     let lower = ImageTissue { threshold: 0.3, ..ImageTissue::default() };
     assert_eq!(of(lower.clone(), &picture)?.extent(), Extent::Area(2.0));
-    // Of the rest, NaN is no tissue.
+    // NaN is not part of the inverted tissue.
     let rest = of(ImageTissue { inverted: true, ..lower }, &picture)?;
     assert_eq!(rest.extent(), Extent::Area(3.0));
     let volume = TissueImage { size: UVec3::new(1, 1, 2), values: vec![1.0, 0.0] };

@@ -1,4 +1,4 @@
-//! Volumes of meshes whose inside is known.
+//! Volumes of meshes with a known inside.
 
 use super::{Outcome, assert_moments, ball_soup, grid, in_cube, random_mesh, rng, samples};
 use bevy_math::{DVec3, Vec3};
@@ -67,7 +67,7 @@ fn assert_volume(mesh: &TriangleMesh, expected: f32) -> MeshVolume {
     volume
 }
 
-/// How often a mesh winds around a point, by the solid angles of its triangles (van Oosterom & Strackee 1983).
+/// Winding number of a mesh around a point, by the solid angles of its triangles (van Oosterom & Strackee 1983).
 fn winding(mesh: &TriangleMesh, point: Vec3) -> f64 {
     let solid_angle = |triangle| {
         let [a, b, c]: [DVec3; 3] = mesh.corners(triangle).map(|corner| corner.as_dvec3() - point.as_dvec3());
@@ -118,7 +118,7 @@ fn shells_unite_unless_one_is_a_cavity() -> Outcome {
     assert!(!hollow.contains(Vec3::splat(0.5)) && hollow.contains(Vec3::splat(0.1)));
     assert_volume(&joined(&[inward(&cube), core.clone()])?, 0.875);
     assert_volume(&joined(&[inward(&cube), inward(&core)])?, 1.0);
-    // A cavity that holds a core of its own.
+    // A cavity with a core of its own.
     let seed = cuboid(Vec3::splat(0.4), Vec3::splat(0.6))?;
     assert_volume(&joined(&[cube.clone(), inward(&core), seed])?, 0.883);
 
@@ -247,7 +247,7 @@ fn any_heap_of_triangles_is_a_volume_or_an_error() -> Outcome {
             assert!(volume.closest_point(point).position.is_finite());
         }
     }
-    // A triangle as long as the whole, in a thousand copies a little apart, and one non-manifold fan.
+    // A triangle as long as the mesh, in a thousand slightly different copies: one non-manifold fan.
     let mut positions = vec![Vec3::ZERO, Vec3::X];
     positions.extend((0..1000).map(|_| Vec3::new(0.5, rng.random(), rng.random())));
     let fan = TriangleMesh::new(positions, (2..1002).map(|i| [0, 1, i]).collect(), None)?;

@@ -1,4 +1,4 @@
-//! Random trees and the slowest index there is.
+//! Random trees and a brute-force index.
 
 use bevy_math::{Vec3, vec3};
 use bevy_vessels::synthesis::instances::{FlatEnds, SegmentColors, SegmentInstance, write_stumps};
@@ -24,8 +24,8 @@ pub fn straight(segments: u32) -> VesselTree {
     tree(positions, parents, vec![0.05; nodes])
 }
 
-/// A random forest in a cube of side 2 around the origin, of short segments: some nodes are roots, the others hang on any
-/// node before them, mostly on a late one.
+/// A random forest of short segments in a cube of side 2 around the origin: some nodes are roots, the others have any
+/// earlier node as parent, mostly a late one.
 pub fn forest(seed: u64, size: usize) -> VesselTree {
     let mut rng = rng(seed);
     let (mut positions, mut parents): (Vec<Vec3>, Vec<u32>) = (Vec::new(), Vec::new());
@@ -54,13 +54,13 @@ pub fn all(tree: &VesselTree) -> impl Fn(&Region, &mut dyn FnMut(NodeId)) + Copy
     move |_, visit| (0..nodes).rev().for_each(|node| visit(NodeId(node)))
 }
 
-/// Which segments are drawn flat, from scratch.
+/// The segments with flat ends, computed from scratch.
 pub fn flat_ends(wounds: &Wounds, tree: &VesselTree) -> FlatEnds {
     let children = tree.children();
     FlatEnds::new(wounds, tree, |node| children.of(node.index()).iter().map(|&child| NodeId(child)))
 }
 
-/// All that is drawn in place of segments as they grew.
+/// Everything that is drawn instead of whole segments.
 pub fn stumps(wounds: &Wounds, tree: &VesselTree, colors: &SegmentColors) -> Vec<SegmentInstance> {
     let mut out = Vec::new();
     write_stumps(wounds, &flat_ends(wounds, tree), tree, &[], colors, &mut out);

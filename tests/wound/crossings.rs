@@ -1,4 +1,4 @@
-//! Random blades of every kind under random transforms, against plain arithmetic in the space of the blade.
+//! Random blades of every kind under random transforms, against simple arithmetic in the space of the blade.
 
 use crate::common::{all, forest, random_point, rng};
 use bevy_math::{Affine3A, DAffine3, DMat3, DVec3, Mat3, Quat, Vec3};
@@ -10,7 +10,7 @@ use bevy_vessels::synthesis::{
 };
 use rand::RngExt;
 
-/// A blade as the twin knows it, in world space.
+/// A blade for the reference computation, in world space.
 enum Twin {
     Triangles(Vec<[Vec3; 3]>),
     Disc(Vec3, Vec3, f32),
@@ -56,14 +56,14 @@ fn random_transform(rng: &mut VesselRng, kind: usize) -> Affine3A {
     Affine3A::from_mat3_translation(matrix, 10.0 * random_point(rng))
 }
 
-/// What the twin finds in one segment, and whether it is too close to call in f64 and f32.
+/// The reference result for one segment, and whether it is too close to decide in f64 and f32.
 struct Found {
-    /// Ends of stretches taken out.
+    /// Ends of removed stretches.
     stretches: Vec<[f64; 2]>,
     is_close: bool,
 }
 
-/// How near to an edge, or to touching only, the twin leaves the decision open; relative to the blade.
+/// Distance to an edge, or to mere contact, within which the reference leaves the result open; relative to the blade.
 const CLOSE: f64 = 1e-4;
 
 fn twin_of_triangle(start: DVec3, end: DVec3, corners: [Vec3; 3]) -> Found {
@@ -86,7 +86,7 @@ fn twin_of_disc(start: DVec3, end: DVec3, center: Vec3, normal: Vec3, radius: f3
     Found { stretches: if margin > 0.0 { vec![[share, share]] } else { vec![] }, is_close }
 }
 
-/// By search alone: the distance to the axis is convex along the segment.
+/// By search only: the distance to the axis is convex along the segment.
 fn twin_of_capsule(start: DVec3, end: DVec3, from: Vec3, to: Vec3, radius: f32) -> Found {
     let (from, to, radius) = (from.as_dvec3(), to.as_dvec3(), f64::from(radius));
     let outside = |share: f64| {

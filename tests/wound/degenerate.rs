@@ -25,8 +25,8 @@ fn dot(a: Exact, b: Exact) -> i128 {
     (0..3).map(|axis| a[axis] * b[axis]).sum()
 }
 
-/// Where a segment without its start meets a triangle, as a fraction: the plane's equation solved, then the point, times
-/// the denominator, tested against the edges within the plane.
+/// The share at which a segment without its start meets a triangle, as a fraction: it solves the plane's equation, then
+/// tests the point, times the denominator, against the edges within the plane.
 fn fraction(start: I64Vec3, end: I64Vec3, corners: [I64Vec3; 3]) -> Option<(i128, i128)> {
     let (start, end, [a, b, c]) = (exact(start), exact(end), corners.map(exact));
     let normal = cross(minus(b, a), minus(c, a));
@@ -46,7 +46,7 @@ fn fraction(start: I64Vec3, end: I64Vec3, corners: [I64Vec3; 3]) -> Option<(i128
     (inside(a, b) && inside(b, c) && inside(c, a)).then_some((over, under))
 }
 
-/// All shares at which a segment is severed, none twice.
+/// All shares at which a segment is severed, without repeats.
 fn shares(start: I64Vec3, end: I64Vec3, triangles: &[[I64Vec3; 3]]) -> Vec<f64> {
     let mut found: Vec<(i128, i128)> = triangles.iter().filter_map(|&corners| fraction(start, end, corners)).collect();
     found.sort_by(|a, b| (a.0 * b.1).cmp(&(b.0 * a.1)));
@@ -75,7 +75,7 @@ fn soups_on_whole_numbers_sever_what_rational_arithmetic_says() {
     let mut rng = rng(11);
     let (mut total, mut at_nodes) = (0, 0);
     for round in 0..12_000 {
-        // The largest numbers use 15 bits, so that the twin's products of seven stay within 128.
+        // The largest numbers use 15 bits, so that the reference's products of seven fit in 128 bits.
         let limit = [2, 3, 6, 1000, 1 << 15][round % 5];
         let (tree, nodes, triangles) = case(&mut rng, limit);
         let Ok(blade) = Blade::triangles(triangles.iter().map(|corners| corners.map(|c| c.as_vec3())).collect()) else {
@@ -118,7 +118,7 @@ fn a_closed_sheet_is_passed_exactly_once_anywhere() {
     for height in [0, 1, 5] {
         let blade = sheet(&mut rng, height);
         let (mut positions, mut parents) = (Vec::new(), Vec::new());
-        // Upright lines, through corners, edges, diagonals and between.
+        // Vertical lines through corners, edges, diagonals and in between.
         for (x, y) in (0..33 * 33).map(|at| (at % 33, at / 33)) {
             let foot = vec3(x as f32 / 4.0, y as f32 / 4.0, 0.0);
             positions.extend([foot - 7.0 * Vec3::Z, foot + 9.0 * Vec3::Z]);
@@ -153,7 +153,7 @@ fn a_blade_through_a_node_severs_one_segment_of_every_way_through_it() {
 #[test]
 fn successive_sweeps_leave_no_slit_between_them() {
     let mut rng = rng(13);
-    // A vessel that the edge of two frames passes exactly, on a grid where that is exact.
+    // A vessel that the edge shared by two frames' sweeps meets exactly, on a grid where this is exact.
     for _ in 0..2_000 {
         let edges: [[Vec3; 2]; 3] = std::array::from_fn(|frame| {
             let mut end =

@@ -1,4 +1,4 @@
-//! Which segments beside a cut are drawn flat: kept up to date as from scratch, whatever the order of what was done.
+//! Segments with flat ends beside a cut: incremental updates equal a computation from scratch, in any order of actions.
 
 use crate::common::{all, flat_ends, forest, random_point, rng, straight, stumps, tree};
 use bevy_math::Vec3;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 const WHITE: SegmentColors = SegmentColors::Uniform([1.0; 3]);
 
-/// A forest whose segments are about as wide as they are long; where `tapers`, most of them go on with their parents'
+/// A forest whose segments are about as wide as they are long; with `tapers`, most of them continue their parents'
 /// width.
 fn thick_forest(rng: &mut VesselRng, seed: u64, tapers: bool) -> VesselTree {
     let slender = forest(seed, 300);
@@ -33,7 +33,7 @@ fn random_cut(rng: &mut VesselRng) -> Blade {
     Blade::rectangle(center, side, 0.5 * side.cross(other)).expect("a rectangle")
 }
 
-/// What a renderer keeps, who writes no more than what is said to have changed.
+/// The state of a renderer that writes only the reported changes.
 struct Drawn<'a> {
     tree: &'a VesselTree,
     children: Children,
@@ -46,7 +46,7 @@ impl<'a> Drawn<'a> {
         Self { tree, children: tree.children(), flat: FlatEnds::default(), segments: BTreeMap::new() }
     }
 
-    /// Takes in an action, and returns how many segments were written beside those that it changed.
+    /// Updates after an action, and returns the number of written segments besides those that it changed.
     fn hear(&mut self, wounds: &Wounds, report: &WoundReport) -> usize {
         let children = |node: NodeId| self.children.of(node.index()).iter().map(|&child| NodeId(child));
         let others = self.flat.update(wounds, self.tree, children, report.changed.iter().copied());

@@ -1,4 +1,4 @@
-//! The flow takes what the ledger says, action by action.
+//! The flow follows the ledger, action by action.
 
 use crate::common::{all, forest, random_point, rng};
 use bevy_vessels::synthesis::haemodynamics::{EndSide, FlowSettings, Network};

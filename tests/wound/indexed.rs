@@ -1,4 +1,4 @@
-//! The ledger through the index, while the tree grows and moves, against the ledger through all segments.
+//! The ledger with the index, while the tree grows and moves, against the ledger with all segments.
 
 use crate::common::{all, forest, random_point, rng};
 use bevy_math::{Affine3A, Mat3, Vec3};
@@ -28,7 +28,7 @@ fn random_blade(rng: &mut VesselRng) -> Blade {
     blade.expect("a blade")
 }
 
-/// The first nodes of a tree, where they are after the whole was stirred.
+/// A tree of the first nodes, after all nodes were moved.
 fn part(whole: &VesselTree, nodes: usize, stir: Vec3) -> VesselTree {
     let moved = |at: &Vec3| *at + stir * at.length_squared();
     let positions = whole.positions()[..nodes].iter().map(moved).collect();
@@ -81,7 +81,7 @@ fn blades_aslant_and_far_away_miss_nothing() {
         let index = SegmentIndex::new(&tree);
         let [mut fast, mut slow] = [Wounds::default(), Wounds::default()];
         for step in 0..200 {
-            // Stretched and sheared about the tree's middle, as blades of the world are in an organ's space.
+            // Stretched and sheared about the tree's middle, like world blades in an organ's space.
             let shear = Mat3::from_cols(Vec3::new(1.0, 0.4, 0.0), 0.3 * Vec3::Y, Vec3::new(0.2, 0.0, 1.5));
             let to_world = Affine3A::from_mat3(shear) * Affine3A::from_translation(-away);
             let blade = random_blade(&mut rng).to_local(&to_world).expect("a blade");

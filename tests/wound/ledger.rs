@@ -1,4 +1,4 @@
-//! What each action does to a vessel along x whose numbers are plain.
+//! The effect of each action on a vessel along x with simple numbers.
 
 use crate::common::{all, straight, tree};
 use bevy_math::{Vec3, vec3};
@@ -7,7 +7,7 @@ use bevy_vessels::synthesis::wound::{
     Blade, BladeError, EndId, EndSide, PieceKind, Retraction, SeveredEnd, WoundError, Wounds,
 };
 
-/// Across the x axis at each of some places.
+/// A blade across the x axis at each of some places.
 fn across(places: &[f32]) -> Blade {
     let triangle = |&x: &f32| [vec3(x, -1.0, -1.0), vec3(x, 2.0, -1.0), vec3(x, -1.0, 2.0)];
     Blade::triangles(places.iter().map(triangle).collect()).expect("valid numbers")
@@ -17,7 +17,7 @@ fn ball(x: f32, radius: f32) -> Blade {
     Blade::ball(Vec3::X * x, radius).expect("valid numbers")
 }
 
-/// Ends draw back by `length`.
+/// A ledger whose ends retract by `length`.
 fn drawing_back(length: f32) -> Wounds {
     Wounds::new(Retraction { radii: 0.0, length }).expect("valid numbers")
 }
@@ -30,7 +30,7 @@ fn near(found: f32, expected: f32) {
     assert!((found - expected).abs() < 1e-6, "{found}, not {expected}");
 }
 
-/// Positions along x of some ends, which are to be open or not.
+/// Positions along x of some ends.
 fn at<'a>(ends: impl IntoIterator<Item = &'a SeveredEnd>) -> Vec<f32> {
     ends.into_iter().map(|end| end.position.x).collect()
 }
@@ -74,7 +74,7 @@ fn what_crosses_a_gap_severs_nothing_and_a_stump_is_cut_again() {
     }
     assert_eq!((wounds.generation(), wounds.actions()), (1, 1), "nothing happened since");
     let report = wounds.cut(&across(&[0.2]), &tree, all(&tree));
-    // The floating piece is 0.2 long: its end draws back by 45 % of that.
+    // The floating piece is 0.2 long: its end retracts by 45 % of that.
     assert_at(&report.opened, &[0.11, 0.29]);
     assert!(report.closed.is_empty());
     let blockage = wounds.blockage(NodeId(1)).unwrap();
@@ -195,12 +195,12 @@ fn heat_seals_up_to_a_calibre_and_cuts_through_seals_stay_dry() {
     let cut = wounds.cut(&across(&[0.5]), &tree, all(&tree));
     assert_eq!((cut.severed, cut.changed.len()), (2, 2));
     assert!(cut.opened.iter().all(|end| end.place.node == NodeId(1)) && cut.opened.len() == 2);
-    // Sealing the ends of the thick one, with an instrument that can.
+    // Seals the ends of the thick one, with an instrument that can.
     let sealed = wounds.cauterise(&ball(0.5, 0.25), 0.1, &tree, all(&tree)).unwrap();
     assert_eq!(sealed.closed, ids(&cut.opened));
     assert!(wounds.cauterise(&ball(0.5, 0.25), 0.1, &tree, all(&tree)).unwrap().is_empty(), "done already");
     assert!(open(&wounds, &tree).is_empty());
-    // Beside the sealed stretch the vessel still bleeds: the end that is left hangs on open vessel.
+    // Beside the sealed stretch the vessel still bleeds: the remaining end belongs to an open vessel.
     let beside = wounds.cut(&across(&[0.1]), &tree, all(&tree));
     assert_at(&beside.opened, &[0.055, 0.055]);
 }
@@ -246,7 +246,7 @@ fn growth_and_movement_go_on_beneath_the_wounds() {
     assert_eq!((end.place, end.direction, end.radius), (cut.opened[0].place, Vec3::Y, 0.2));
     near(end.position.y, 4.2);
     assert_eq!(wounds.undo(&moved).unwrap().closed, ids(&cut.opened));
-    // A tree that lost the segment altogether: no end, and no panic.
+    // A tree that lost the segment: no end, and no panic.
     let cut = wounds.cut(&across(&[3.5]), &grown, all(&grown));
     assert_eq!(wounds.end(cut.opened[0].id, &young), None);
     assert_eq!(wounds.ends(&young).count(), 0);

@@ -1,4 +1,4 @@
-//! Cuts against brute force: what a blade severs, the ledger of wounds, and what is left to draw.
+//! Cuts against brute force: the segments that a blade severs, the ledger of wounds, and the pieces to draw.
 
 mod common;
 mod crossings;

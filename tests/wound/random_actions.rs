@@ -9,7 +9,7 @@ use bevy_vessels::synthesis::wound::{
 use rand::RngExt;
 use std::collections::BTreeSet;
 
-/// What a caller knows who heard nothing but reports.
+/// The state that a caller knows from reports alone.
 #[derive(Clone, Default, PartialEq, Debug)]
 struct Heard {
     open: BTreeSet<EndId>,
@@ -55,7 +55,7 @@ fn random_place(rng: &mut VesselRng, tree: &VesselTree) -> Place {
     Place::new(NodeId(rng.random_range(0..tree.len() as u32)), rng.random_range(0.0..=1.0))
 }
 
-/// Crossings of a surface that meet a vessel that is still there: neither in a gap nor on its tips.
+/// Crossings of a surface with remaining vessels: neither in a gap nor on its tips.
 fn expected_crossings(wounds: &Wounds, tree: &VesselTree, blade: &Blade) -> usize {
     let mut hits = Vec::new();
     severed(blade, tree, all(tree), &mut hits);
@@ -66,7 +66,7 @@ fn expected_crossings(wounds: &Wounds, tree: &VesselTree, blade: &Blade) -> usiz
     hits.iter().filter(meets).count()
 }
 
-/// One random action, undo aside; `None` where it was turned down.
+/// One random action other than undo; `None` if it was refused.
 fn act(rng: &mut VesselRng, wounds: &mut Wounds, tree: &VesselTree, heard: &Heard) -> Option<WoundReport> {
     let report = match rng.random_range(0..10) {
         0..5 => {

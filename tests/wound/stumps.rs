@@ -1,4 +1,4 @@
-//! What is left of cut vessels, to draw and to find.
+//! The remaining pieces of cut vessels, drawn and searched.
 
 use crate::common::{all, flat_ends, forest, random_point, rng, straight, stumps};
 use bevy_math::{Vec3, vec3};
@@ -14,7 +14,7 @@ fn cut_at(wounds: &mut Wounds, tree: &VesselTree, x: f32) {
     assert_eq!(wounds.cut(&blade, tree, all(tree)).severed, 1, "at {x}");
 }
 
-/// What is drawn of a vessel that was cut twice, against the ledger. `domes` have the heights of round ends, in radii.
+/// The drawing of a vessel that was cut twice, against the ledger. `domes` are the heights of round ends, in radii.
 fn assert_gaps(sealed: bool, domes: [f32; 2]) {
     for (radii, long) in [(1.5, 1.0), (0.5, 1.0), (1.5, 0.1), (0.0, 0.03)] {
         // Vessels from slender to thicker than long.
@@ -79,7 +79,7 @@ fn pieces_share_colour_birth_and_taper_with_the_whole() {
     }
     assert_eq!((out[0].start, out[0].start_radius), (whole[2].start, whole[2].start_radius));
     assert_eq!((out[1].end, out[1].end_radius), (whole[2].end, whole[2].end_radius));
-    // Three tenths of the way from 0.06 to 0.05.
+    // Three tenths between 0.06 and 0.05.
     assert!((out[0].end_radius + 0.057).abs() < 1e-6, "open, so with a minus");
     wounds.undo_all(&tree);
     assert!(stumps(&wounds, &tree, &RED).is_empty());
@@ -108,7 +108,7 @@ fn what_is_taken_out_or_only_clamped_is_not_drawn_in_pieces() {
     assert_eq!(stumps(&wounds, &tree, &RED).len(), 2, "the middle segment is gone");
 }
 
-/// The least distance from a point to the wall of what is left, by many points of every piece.
+/// The least distance from a point to the wall of the remaining pieces, by many points of every piece.
 fn brute(wounds: &Wounds, tree: &VesselTree, point: Vec3) -> f32 {
     let distance = |node: usize, share: f32| {
         tree.position_at(Place::new(NodeId(node as u32), share)).distance(point) - tree.radii()[node]

@@ -1,4 +1,4 @@
-//! How far ends draw back on a vessel of many segments: as far as on one of a few, until something holds them.
+//! Retraction of ends on a vessel of many segments: as far as on one of few segments, until something holds them.
 
 use crate::common::{all, flat_ends, rng, stumps, tree};
 use bevy_math::{Vec3, vec3};
@@ -15,7 +15,7 @@ use rand::RngExt;
 const RADIUS: f32 = 0.4;
 const LENGTH: f32 = 10.0;
 
-/// A vessel along x from 0 to 10, with nodes at some places between.
+/// A vessel along x from 0 to 10, with nodes at some places in between.
 fn tube(joints: &[f32]) -> VesselTree {
     let nodes = [0.0].iter().chain(joints).chain(&[LENGTH]);
     let positions: Vec<Vec3> = nodes.map(|&x| Vec3::X * x).collect();
@@ -28,7 +28,7 @@ fn divided(parts: usize) -> VesselTree {
     tube(&(1..parts).map(|joint| LENGTH * joint as f32 / parts as f32).collect::<Vec<_>>())
 }
 
-/// A vessel with joints anywhere, many of them nearer to each other than it is wide.
+/// A vessel with random nodes, many of them closer to each other than its width.
 fn randomly_divided(rng: &mut VesselRng) -> VesselTree {
     let mut joints: Vec<f32> = (0..60).map(|_| rng.random_range(0.01..LENGTH - 0.01)).collect();
     joints.sort_by(f32::total_cmp);
@@ -49,7 +49,7 @@ fn assert_near(found: &[f32], expected: &[f32], what: &str) {
     assert!(near, "{what}: {found:?}, not {expected:?}");
 }
 
-/// Where all ends of a vessel along x are, from root to tip, and whether each is open.
+/// Positions of all ends of a vessel along x, from root to tip, and whether each is open.
 fn ends(wounds: &Wounds, tree: &VesselTree) -> (Vec<f32>, Vec<(EndSide, bool)>) {
     let mut ends: Vec<SeveredEnd> = wounds.ends(tree).collect();
     // Two may touch.
@@ -57,7 +57,7 @@ fn ends(wounds: &Wounds, tree: &VesselTree) -> (Vec<f32>, Vec<(EndSide, bool)>) 
     ends.iter().map(|end| (end.position.x, (end.side, end.is_open))).unzip()
 }
 
-/// A straight vessel by its length alone: without nodes.
+/// A straight vessel, described by its length alone, without nodes.
 #[derive(Default)]
 struct Line {
     /// Gaps, and whether the vessel has an end on either side.
@@ -70,7 +70,7 @@ impl Line {
         self.gaps.iter().find(|([from, to], _)| *from <= x && x <= *to).copied()
     }
 
-    /// Where ends come to rest that are severed at a place, with others severed at the same time.
+    /// Rest positions of ends that are severed at a place, with others severed at the same time.
     fn rest(&self, x: f32, others: &[f32], wish: f32) -> [f32; 2] {
         let gaps = self.gaps.iter().map(|(gap, _)| *gap);
         let holds = || others.iter().chain(&self.clamps).copied().filter(|&hold| hold != x);
@@ -116,7 +116,7 @@ impl Line {
     }
 }
 
-/// All that is drawn: whole segments in their slots, and what is drawn in place of others.
+/// Everything that is drawn: whole segments in their slots, and pieces in place of others.
 fn drawn(wounds: &Wounds, tree: &VesselTree) -> Vec<SegmentInstance> {
     let mut all = vec![SegmentInstance::HIDDEN; tree.len()];
     let white = SegmentColors::Uniform([1.0; 3]);
@@ -128,7 +128,7 @@ fn drawn(wounds: &Wounds, tree: &VesselTree) -> Vec<SegmentInstance> {
     all
 }
 
-/// From where to where along x a segment is drawn, round ends included.
+/// The range along x in which a segment is drawn, round ends included.
 fn reach(segment: &SegmentInstance) -> [f32; 2] {
     let ([start, end], [starts_open, ends_open]) = (segment.radii(), segment.is_open());
     let dome = |height: f32, is_open: bool| if is_open { 0.0 } else { height };
@@ -204,7 +204,7 @@ fn nothing_drawn_reaches_into_a_gap_or_a_lumen() {
             let [start, end] = reach(&segment);
             let (is_before, is_after) = (end <= from + 1e-5, start >= to - 1e-5);
             assert!(is_before || is_after, "{parts} parts: {start} to {end} fills the gap {from} to {to}");
-            // A round end that looks out of the lumen would be seen in it.
+            // A round end that reaches into the lumen would be visible in it.
             let in_first = is_before && !segment.is_open()[1] && end > (from - depth).max(0.0);
             let in_last = is_after && !segment.is_open()[0] && start < (to + depth).min(LENGTH);
             assert!(!in_first && !in_last, "{parts} parts: {start} to {end} fills a lumen of {from} to {to}");
@@ -230,7 +230,7 @@ fn where_vessel_is_gone_with_an_end_there_is_none() {
     }
     let (place, distance) = wounds.nearest_place(&tree, all(&tree), Vec3::X * 5.04, 1.0).expect("one of the ends");
     assert!((tree.position_at(place).x - 4.45).abs() < 1e-5 && (distance + RADIUS - 0.59).abs() < 1e-5);
-    // The ends are cut again, where they are now.
+    // The ends are cut again, at their present positions.
     assert_eq!(wounds.cut(&across(&[4.4, 5.7]), &tree, all(&tree)).severed, 2);
     wounds.undo_all(&tree);
     assert!(wounds.is_empty());
@@ -282,7 +282,7 @@ fn a_round_end_goes_on_where_the_vessel_bends() {
     let blade = Blade::rectangle(vec3(4.0, 0.8, 0.0), Vec3::X, Vec3::Z).expect("a blade");
     wounds.cut(&blade, &tree, all(&tree));
     let stump = drawn(&wounds, &tree);
-    // The first segment ends flat in the bend; the stump begins as far before that as covers its rim.
+    // The first segment ends flat in the bend; the stump begins early enough to cover its rim.
     assert!(stump.iter().any(|s| s.end == [4.0, 0.0, 0.0] && s.is_open() == [false, true]));
     assert!(stump.iter().any(|s| s.start == [4.0, -RADIUS, 0.0] && s.is_open() == [false, true]), "{stump:?}");
 }

@@ -1,15 +1,15 @@
-//! Circulate: open ends bleed for as long as a frame lasts.
+//! Circulate: open ends bleed for the duration of a frame.
 //!
-//! In: the flow of organs, the ledgers in [`VesselWounds`](crate::plugin::VesselWounds), and the time. Out: rates on
-//! [`OpenEnd`] entities, [`BloodLoss`](crate::plugin::BloodLoss) and messages.
+//! In: the flow of organs, the ledgers in [`VesselWounds`](crate::plugin::VesselWounds), and the frame's time. Out:
+//! rates on [`OpenEnd`] entities, [`BloodLoss`](crate::plugin::BloodLoss) and messages.
 
 use crate::plugin::{
-    announcer::Announcer,
     circulation::{
-        flow::{CirculationState, Perfused, PerfusedItem, PerfusedOrgan, PerfusedOrganItem, each_kind},
-        messages::{BleedingStarted, BleedingStopped, CirculationFailed},
+        messages::{BleedingMessages, BleedingStarted, BleedingStopped},
         organ_flow::FlowingEnd,
         patient::{Patient, patient_of},
+        perfused::{Perfused, PerfusedItem, PerfusedOrgan, PerfusedOrganItem, each_kind},
+        state::CirculationState,
     },
     surgery::open_ends::OpenEnd,
     vessels::relations::OrganVessels,
@@ -25,20 +25,12 @@ use bevy::{
         change_detection::{DetectChanges, DetectChangesMut, Res},
         entity::Entity,
         hierarchy::ChildOf,
-        system::{Query, SystemParam},
+        system::Query,
     },
     time::Time,
 };
 
-/// Who is told of bleeding.
-#[derive(SystemParam)]
-pub(crate) struct BleedingMessages<'w, 's> {
-    pub(crate) started: Announcer<'w, 's, BleedingStarted>,
-    pub(crate) stopped: Announcer<'w, 's, BleedingStopped>,
-    pub(crate) failed: Announcer<'w, 's, CirculationFailed>,
-}
-
-/// Lets open ends bleed for as long as the frame lasts.
+/// Lets open ends bleed for the duration of the frame.
 pub(crate) fn bleed(
     time: Option<Res<Time>>,
     mut organs: Query<PerfusedOrgan>,
@@ -50,7 +42,7 @@ pub(crate) fn bleed(
 ) {
     let frame = time.map_or(0.0, |time| time.delta_secs_f64());
     let mut turns: Vec<Entity> = organs.iter().map(|organ| organ.entity).collect();
-    // Organs that share a patient take their turns in the same order always.
+    // Organs that share a patient always take their turns in the same order.
     turns.sort_unstable();
     for entity in turns {
         let Ok(mut organ) = organs.get_mut(entity) else { continue };
@@ -66,7 +58,7 @@ pub(crate) fn bleed(
 }
 
 impl PerfusedOrganItem<'_, '_> {
-    /// Bleeds for a time, and says whether anything was lost.
+    /// Bleeds for a time, and returns whether any blood was lost.
     fn bleed(
         &mut self,
         seconds: f64,
@@ -130,7 +122,7 @@ fn lay_gaps(
     Ok(Some(before))
 }
 
-/// Says which ends of a vessel entity began and stopped to bleed.
+/// Announces which ends of a vessel entity began or stopped bleeding.
 fn tell(
     organ: Entity,
     found: &PerfusedItem,

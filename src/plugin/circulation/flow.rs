@@ -1,156 +1,45 @@
-//! Circulate: the blood of organs with a [`Perfusion`], made to flow.
+//! Circulate: makes the blood of organs with a [`Perfusion`] flow.
 //!
-//! In: [`Vessels`] at rest and the organ's settings. Out: the flow in [`CirculationState`]. Networks are made in
-//! jobs. Given the same vessels, actions and time steps, the same is
-//! lost to the last bit, as long as no network is on its way.
+//! In: [`Vessels`](crate::plugin::Vessels) at rest and the organ's settings. Out: the flow in [`CirculationState`].
+//! Jobs make the networks. The same vessels, actions and time steps give the same blood loss to the last bit, while no
+//! network is being made.
 
 use crate::plugin::{
     announcer::Announcer,
     circulation::{
-        bleeding::BleedingMessages,
-        messages::{BleedingStopped, CirculationError, CirculationFailed},
-        organ_flow::{FlowingEnd, OrganFlow, Trees},
-        patient::Patient,
+        gauge::Gauge,
+        messages::{BleedingMessages, BleedingStopped, CirculationFailed},
+        organ_flow::{OrganFlow, Trees},
+        patient::{Patient, patient_of},
+        perfused::{Perfused, PerfusedOrgan, PerfusedOrganItem, each_kind},
         perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply},
-        supply::Gauge,
+        state::{CirculationState, MadeFor},
     },
     growth::{progress::GrowthProgress, state::GrowthState},
     job::{Job, JobPanic, Jobs},
     surgery::open_ends::{OpenEnd, OpenEndEntities},
-    vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
+    vessels::{
+        relations::{OrganVessels, VesselsOf},
+        wounds::VesselWounds,
+    },
 };
-use crate::plugin::{circulation::patient::patient_of, vessels::relations::VesselsOf};
 use crate::synthesis::{
     haemodynamics::{Bleeding, EndState, FlowError},
     pace::Pace,
-    tree::{BedLink, ByKind, VesselKind},
+    tree::{BedLink, ByKind},
 };
-use bevy::{
-    ecs::{
-        change_detection::{DetectChanges, DetectChangesMut},
-        component::Component,
-        entity::Entity,
-        hierarchy::ChildOf,
-        lifecycle::Remove,
-        observer::On,
-        query::{QueryData, With},
-        reflect::ReflectComponent,
-        system::{Commands, Query},
-        world::{EntityWorldMut, Ref},
-    },
-    log::warn,
-    reflect::{Reflect, ReflectDeserialize, ReflectSerialize, std_traits::ReflectDefault},
+use bevy::ecs::{
+    change_detection::{DetectChanges, DetectChangesMut},
+    entity::Entity,
+    hierarchy::ChildOf,
+    lifecycle::Remove,
+    observer::On,
+    query::With,
+    system::{Commands, Query},
+    world::EntityWorldMut,
 };
-use serde::{Deserialize, Serialize};
 
-/// The flow in an organ's vessels. The plugin drives it.
-///
-/// Scenes and clones of the organ keep how far its open ends have clotted. All else is made anew.
-#[derive(Component, Debug, Default, Reflect, Serialize, Deserialize)]
-#[reflect(opaque, Component, Default, Clone, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CirculationState {
-    /// The vessels that the flow is of, or will be when it is made.
-    #[serde(skip)]
-    made_for: Option<MadeFor>,
-    /// How they are perfused, paused or not.
-    #[serde(skip)]
-    made_with: Option<Perfusion>,
-    #[serde(skip)]
-    job: Option<Job<Result<OrganFlow, FlowError>>>,
-    #[serde(skip)]
-    pub(crate) flow: Option<OrganFlow>,
-    pub(crate) bleeding: ByKind<Bleeding>,
-    /// Open ends in the order of the networks'.
-    #[serde(skip)]
-    pub(crate) ends: ByKind<Vec<FlowingEnd>>,
-    /// Whether the gaps have to be laid anew.
-    #[serde(skip)]
-    pub(crate) is_unlaid: bool,
-    /// How the supply is measured, once the vessels have grown.
-    #[serde(skip)]
-    pub(crate) gauge: Gauge,
-    #[serde(skip)]
-    error: Option<CirculationError>,
-}
-
-/// Which vessels a flow is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct MadeFor {
-    lineages: ByKind<Lineage>,
-    nodes: ByKind<usize>,
-    is_grown: bool,
-}
-
-/// What scenes keep.
-impl Clone for CirculationState {
-    fn clone(&self) -> Self {
-        Self { bleeding: self.bleeding.clone().map(|_, bleeding| bleeding.resumed()), ..Self::default() }
-    }
-}
-
-impl MadeFor {
-    /// Whether some of its vessels have given way to others.
-    fn is_replaced_by(&self, now: &Self) -> bool {
-        VesselKind::ALL.into_iter().any(|kind| self.nodes[kind] > 0 && self.lineages[kind] != now.lineages[kind])
-    }
-}
-
-impl CirculationState {
-    /// Whether blood flows: the vessels are there, and their network has been made.
-    pub fn flows(&self) -> bool {
-        self.flow.is_some()
-    }
-
-    /// How each open end of a kind of vessels bleeds, as of the last frame.
-    pub fn bleeding(&self, kind: VesselKind) -> &Bleeding {
-        &self.bleeding[kind]
-    }
-
-    /// Why no blood flows, if something is wrong.
-    pub fn error(&self) -> Option<&CirculationError> {
-        self.error.as_ref()
-    }
-
-    pub(crate) fn flow(&self) -> Option<&OrganFlow> {
-        self.flow.as_ref()
-    }
-
-    /// Takes over a new flow, with what the old one has laid.
-    fn take(&mut self, mut flow: OrganFlow, is_grown: bool) -> Result<(), FlowError> {
-        if let Some(before) = &self.flow {
-            flow.keep_gaps_of(before)?;
-        }
-        self.flow = Some(flow);
-        self.is_unlaid = true;
-        self.gauge = if is_grown { Gauge::ready() } else { Gauge::default() };
-        Ok(())
-    }
-}
-
-/// A vessel entity, with all that flow reads.
-#[derive(QueryData)]
-pub(crate) struct Perfused {
-    pub(crate) entity: Entity,
-    pub(crate) vessels: &'static Vessels,
-    pub(crate) wounds: Option<Ref<'static, VesselWounds>>,
-    pub(crate) entities: Option<&'static OpenEndEntities>,
-}
-
-/// An organ with blood, and what its vessels grow from.
-#[derive(QueryData)]
-#[query_data(mutable)]
-pub(crate) struct PerfusedOrgan {
-    pub(crate) entity: Entity,
-    pub(crate) perfusion: Ref<'static, Perfusion>,
-    pub(crate) vessels: Option<&'static OrganVessels>,
-    pub(crate) growth: Option<&'static GrowthState>,
-    pub(crate) progress: Option<&'static GrowthProgress>,
-    pub(crate) state: &'static mut CirculationState,
-    pub(crate) loss: &'static mut BloodLoss,
-}
-
-/// Gives a patient to organs that find none, and their vessels what is to be written on them.
+/// Gives a patient to organs that find none, and the written components to their vessels.
 pub(crate) fn prepare_organs(
     mut commands: Commands,
     organs: Query<(Entity, Option<&OrganVessels>), With<Perfusion>>,
@@ -169,7 +58,7 @@ pub(crate) fn prepare_organs(
     }
 }
 
-/// Makes the flow of vessels that are new, have grown, or are to be perfused otherwise.
+/// Makes the flow of vessels that are new, have grown, or have a changed perfusion.
 pub(crate) fn make_flow(
     mut organs: Query<PerfusedOrgan>,
     vessels: Query<Perfused>,
@@ -188,10 +77,6 @@ pub(crate) fn make_flow(
 }
 
 impl PerfusedOrganItem<'_, '_> {
-    fn entities(&self) -> &[Entity] {
-        self.vessels.map_or(&[], OrganVessels::entities)
-    }
-
     fn vessels_now(&self, vessels: &Query<Perfused>) -> MadeFor {
         let is_grown = self.progress.is_none_or(GrowthProgress::is_finished);
         let mut made_for = MadeFor { lineages: ByKind::default(), nodes: ByKind::default(), is_grown };
@@ -203,18 +88,18 @@ impl PerfusedOrganItem<'_, '_> {
         made_for
     }
 
-    /// Whether another flow is to be made than there is.
+    /// Whether a new flow has to be made.
     fn takes_note_of(&mut self, made_for: MadeFor) -> bool {
         let mut is_new = self.state.made_for != Some(made_for);
         if self.perfusion.is_changed() {
-            let made_with = Some(Perfusion { paused: false, ..Perfusion::clone(&self.perfusion) });
+            let made_with = Some((self.perfusion.hydraulics(), self.perfusion.bleeding));
             is_new |= self.state.made_with != made_with;
             self.state.made_with = made_with;
         }
         is_new
     }
 
-    /// Begins to make a flow. Large trees wait until they have grown.
+    /// Starts making a flow. Large trees wait until they have grown.
     fn begin(&mut self, made_for: MadeFor, vessels: &Query<Perfused>, messages: &mut BleedingMessages, jobs: &Jobs) {
         let is_other = self.state.made_for.is_some_and(|before| before.is_replaced_by(&made_for));
         self.state.made_for = Some(made_for);
@@ -231,12 +116,12 @@ impl PerfusedOrganItem<'_, '_> {
         if !(made_for.is_grown || jobs.is_small(nodes)) {
             return;
         }
-        let (trees, perfusion) = (self.trees(vessels), Perfusion::clone(&self.perfusion));
+        let (trees, hydraulics) = (self.trees(vessels), self.perfusion.hydraulics());
         let links: Vec<BedLink> = match self.growth.and_then(GrowthState::growth) {
-            Some(growth) if perfusion.bed.resistance.is_some() => growth.bed_links().to_vec(),
+            Some(growth) if self.perfusion.bed.resistance.is_some() => growth.bed_links().to_vec(),
             _ => Vec::new(),
         };
-        let make = async move |pace: Pace| OrganFlow::new(trees, &perfusion, &links, &pace).await;
+        let make = async move |pace: Pace| OrganFlow::new(trees, &hydraulics, &links, &pace).await;
         self.state.job = Some(jobs.start(nodes, make));
     }
 
@@ -250,7 +135,7 @@ impl PerfusedOrganItem<'_, '_> {
         trees
     }
 
-    /// Nothing is left of the blood in other vessels, whose ends are gone.
+    /// Drops the flow of replaced vessels, whose ends no longer exist.
     fn forget(&mut self, vessels: &Query<Perfused>, messages: &mut BleedingMessages) {
         for found in each_kind(self.entities(), vessels) {
             let kind = found.vessels.kind();
@@ -274,7 +159,7 @@ impl PerfusedOrganItem<'_, '_> {
         self.loss.set_if_neq(BloodLoss::default());
     }
 
-    /// Other settings of the bleeding begin the clotting anew.
+    /// Restarts the clotting if the bleeding settings changed.
     fn follow_bleeding_settings(&mut self) -> Result<(), FlowError> {
         let settings = self.perfusion.bleeding;
         for bleeding in self.state.bleeding.values_mut() {
@@ -297,30 +182,9 @@ impl PerfusedOrganItem<'_, '_> {
             Err(panic) => self.fail(panic.into(), failed),
         }
     }
-
-    /// The blood stands still until something changes.
-    pub(crate) fn fail(&mut self, error: CirculationError, failed: &mut Announcer<CirculationFailed>) {
-        let organ = self.entity;
-        warn!("{organ}: its blood stands still: {error}");
-        self.state.job = None;
-        self.state.flow = None;
-        self.state.ends.values_mut().for_each(Vec::clear);
-        self.state.error = Some(error.clone());
-        *self.loss = BloodLoss { total: self.loss.total, ..BloodLoss::default() };
-        failed.announce(CirculationFailed { organ, error });
-    }
 }
 
-/// The vessel entity of each kind; of several of one kind, the first.
-pub(crate) fn each_kind<'a>(
-    entities: &'a [Entity],
-    vessels: &'a Query<Perfused>,
-) -> impl Iterator<Item = PerfusedItem<'a, 'a>> {
-    let mut seen = ByKind::<bool>::default();
-    vessels.iter_many(entities).filter(move |found| !std::mem::replace(&mut seen[found.vessels.kind()], true))
-}
-
-/// An organ that is to have no blood any more.
+/// Removes the flow of an organ that lost its [`Perfusion`].
 pub(crate) fn remove_circulation(
     removed: On<Remove, Perfusion>,
     organs: Query<&OrganVessels>,
@@ -342,7 +206,7 @@ pub(crate) fn remove_circulation(
     });
 }
 
-/// Vessels whose ledger is gone have no gaps: those that were laid are taken off.
+/// Takes the gaps off vessels whose ledger was removed.
 pub(crate) fn lay_again(
     removed: On<Remove, VesselWounds>,
     vessels: Query<&VesselsOf>,

@@ -1,9 +1,9 @@
-//! What the circulation tells: which ends bleed, and what keeps blood from flowing.
+//! Messages of the circulation: which ends bleed, and why blood can't flow.
 //!
-//! Each is a message, and an event on the organ, for observers. An open end is named by the fields: the organ is there to
-//! observe before it is cut, and after the end is closed.
+//! Each is a message, and an event on the organ, for observers. The event targets the organ, since that exists before
+//! the cut and after the end closes; the fields name the open end.
 
-use crate::plugin::job::JobPanic;
+use crate::plugin::{announcer::Announcer, job::JobPanic};
 use crate::synthesis::haemodynamics::{EndSide, FlowError};
 use crate::synthesis::wound::EndId;
 use bevy::{
@@ -12,6 +12,7 @@ use bevy::{
         event::EntityEvent,
         message::Message,
         reflect::{ReflectEvent, ReflectMessage},
+        system::SystemParam,
     },
     reflect::Reflect,
 };
@@ -25,16 +26,16 @@ pub struct BleedingStarted {
     pub organ: Entity,
     /// The vessel entity.
     pub vessels: Entity,
-    /// What the ledger knows the end by.
+    /// The end's identifier in the ledger.
     pub end: EndId,
-    /// Which side of the cut it is.
+    /// The end's side of the cut.
     pub side: EndSide,
     /// Its [`OpenEnd`](crate::plugin::OpenEnd) entity.
     pub entity: Entity,
 }
 
-/// An open end bleeds no more: it has clotted, has no pressure left, or was closed. Also an event on the
-/// organ, for observers.
+/// An open end stops bleeding: it has clotted, has no pressure left, or was closed. Also an event on the organ, for
+/// observers.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Message, Event, Clone, PartialEq)]
 pub struct BleedingStopped {
@@ -43,15 +44,15 @@ pub struct BleedingStopped {
     pub organ: Entity,
     /// The vessel entity.
     pub vessels: Entity,
-    /// What the ledger knew the end by.
+    /// The end's identifier in the ledger.
     pub end: EndId,
-    /// Which side of the cut it was.
+    /// The end's side of the cut.
     pub side: EndSide,
     /// Its [`OpenEnd`](crate::plugin::OpenEnd) entity, `None` if it was closed.
     pub entity: Option<Entity>,
 }
 
-/// The blood of an organ can't flow. Other organs are not affected; a change of its
+/// The blood of an organ can't flow. Other organs are not affected. Changing its
 /// [`Perfusion`](crate::plugin::Perfusion) makes it try again. Also an event on the organ, for observers.
 #[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Message, Event, Clone, PartialEq)]
@@ -73,4 +74,12 @@ pub enum CirculationError {
     /// The work on its network panicked.
     #[error(transparent)]
     Panicked(#[from] JobPanic),
+}
+
+/// The messages about bleeding.
+#[derive(SystemParam)]
+pub(crate) struct BleedingMessages<'w, 's> {
+    pub(crate) started: Announcer<'w, 's, BleedingStarted>,
+    pub(crate) stopped: Announcer<'w, 's, BleedingStopped>,
+    pub(crate) failed: Announcer<'w, 's, CirculationFailed>,
 }

@@ -1,4 +1,4 @@
-//! Circulation: blood flows through an organ's vessels, leaves them where they are open, and reaches the tissue or doesn't.
+//! Circulation: blood flows through an organ's vessels, leaves through open ends, and supplies the tissue.
 
 use crate::plugin::{
     order::{self, VesselSystems},
@@ -14,19 +14,21 @@ use bevy::{
 
 pub(crate) mod bleeding;
 pub(crate) mod flow;
+mod gauge;
 pub(crate) mod messages;
 mod organ_flow;
 pub(crate) mod patient;
+mod perfused;
 pub(crate) mod perfusion;
+mod state;
 mod supply;
 
-pub use flow::CirculationState;
 pub use messages::{BleedingStarted, BleedingStopped, CirculationError, CirculationFailed};
 pub use patient::Patient;
 pub use perfusion::{BloodLoss, OrganSupply, Perfusion, SegmentSupply};
+pub use state::CirculationState;
 
-/// Lets blood flow through the vessels of organs with a [`Perfusion`]. Adds the [`SurgeryPlugin`], without which nothing
-/// would bleed.
+/// Lets blood flow through the vessels of organs with a [`Perfusion`]. Adds the [`SurgeryPlugin`], which opens vessels.
 #[derive(Clone, Debug)]
 pub struct CirculationPlugin {
     schedule: Interned<dyn ScheduleLabel>,

@@ -1,12 +1,12 @@
-//! The blood of one organ, without an ECS: its networks, their gaps, and what its tissue gets.
+//! The blood of one organ, without an ECS: its networks, their gaps, and the supply of its tissue.
 //!
-//! In: its trees at rest, a [`Perfusion`] and the ledgers of wounds. Out: bleeding over time,
-//! and the supply of segments and vertices.
+//! In: its trees at rest, settings of their flow and the ledgers of wounds. Out: bleeding over time, and the supply of
+//! segments and vertices.
 
-use crate::plugin::circulation::perfusion::Perfusion;
 use crate::synthesis::{
     haemodynamics::{
-        Bleeding, BloodVolume, Circulation, FlowError, Interruption, Network, Outlet, Supply, TissueSupply,
+        Bleeding, BloodVolume, Circulation, FlowError, FlowSettings, Interruption, Network, Outlet, Supply,
+        TissueSupply,
     },
     pace::Pace,
     tree::{BedLink, ByKind, NodeId, VesselKind, VesselTree},
@@ -19,7 +19,10 @@ use std::sync::Arc;
 /// The trees of an organ; `None` for a kind without vessels.
 pub(crate) type Trees = ByKind<Option<VesselTree>>;
 
-/// An open end that the flow knows.
+/// Settings of the flow in each kind of vessels; `None` for a kind that carries no blood.
+pub(crate) type Hydraulics = ByKind<Option<FlowSettings>>;
+
+/// An open end in the flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FlowingEnd {
     pub(crate) node: NodeId,
@@ -30,32 +33,32 @@ pub(crate) struct FlowingEnd {
 /// The networks of an organ.
 #[derive(Clone, Debug, Default)]
 struct Networks {
-    /// Arteries and veins, where the bed joins them.
+    /// Arteries and veins, if the bed joins them.
     joined: Option<Box<Circulation>>,
-    /// All other kinds, each by itself.
+    /// All other kinds, each on its own.
     apart: ByKind<Option<Network>>,
 }
 
 impl Networks {
-    async fn new(trees: &Trees, perfusion: &Perfusion, links: &[BedLink], pace: &Pace) -> Result<Self, FlowError> {
+    async fn new(trees: &Trees, hydraulics: &Hydraulics, links: &[BedLink], pace: &Pace) -> Result<Self, FlowError> {
         let mut networks = Self::default();
         for (kind, pace) in each_kind(&pace.part(0.0..0.8)) {
-            if let Some((tree, settings)) = trees[kind].as_ref().zip(perfusion.flow_settings(kind)) {
+            if let Some((tree, settings)) = trees[kind].as_ref().zip(hydraulics[kind].clone()) {
                 networks.apart[kind] = Some(Network::new_paced(tree, settings, &pace).await?);
             }
         }
-        if perfusion.bed.resistance.is_some() && !links.is_empty() {
+        if !links.is_empty() {
             networks.join(links, &pace.part(0.8..1.0)).await?;
         }
         Ok(networks)
     }
 
-    /// Joins arteries and veins through the bed, where there are both.
+    /// Joins arteries and veins through the bed, if there are both.
     async fn join(&mut self, links: &[BedLink], pace: &Pace) -> Result<(), FlowError> {
         let Self { joined, apart } = self;
         match (apart.artery.take(), apart.vein.take()) {
             (Some(arteries), Some(veins)) => {
-                // The growth may have gone on since the trees were published.
+                // The growth may have added links since the trees were published.
                 let is_there =
                     |link: &&BedLink| link.arterial.index() < arteries.len() && link.venous.index() < veins.len();
                 let links: Vec<BedLink> = links.iter().filter(is_there).copied().collect();
@@ -82,7 +85,7 @@ impl Networks {
         }
     }
 
-    /// Holds bed and roots at a share of the pressure that the settings give them, that of a pulse in the mean.
+    /// Holds bed and roots at a share of their pressure in the settings, of its mean for a pulse.
     fn hold_at(&mut self, share: f64) -> Result<(), FlowError> {
         let lowered = |pressure: Pressure| Pressure::from_pascals(pressure.pascals() * share);
         for kind in VesselKind::ALL {
@@ -115,14 +118,14 @@ pub(crate) struct OrganFlow {
 }
 
 impl OrganFlow {
-    /// The flow in the intact vessels.
+    /// The flow in the intact vessels. `links` join arteries and veins; without links they stay separate.
     pub(crate) async fn new(
         trees: Trees,
-        perfusion: &Perfusion,
+        hydraulics: &Hydraulics,
         links: &[BedLink],
         pace: &Pace,
     ) -> Result<Self, FlowError> {
-        Ok(Self { networks: Networks::new(&trees, perfusion, links, pace).await?, trees: Arc::new(trees) })
+        Ok(Self { networks: Networks::new(&trees, hydraulics, links, pace).await?, trees: Arc::new(trees) })
     }
 
     /// Lays the gaps of an earlier flow of the same vessels over this one, so that its holes stay as they are.
@@ -137,9 +140,9 @@ impl OrganFlow {
         Ok(())
     }
 
-    /// Lays the gaps of a ledger over a kind's network, in place of those that were.
+    /// Lays the gaps of a ledger over a kind's network, in place of the old ones.
     ///
-    /// Returns its open ends in the order of the network's. Segments that grew since are passed over.
+    /// Returns its open ends, in the order of the network's. Segments that grew since are skipped.
     pub(crate) fn lay(&mut self, kind: VesselKind, wounds: &Wounds) -> Result<Vec<FlowingEnd>, FlowError> {
         let (Some(tree), Some(network)) = (&self.trees[kind], self.networks.get_mut(kind)) else {
             return Ok(Vec::new());
@@ -156,7 +159,7 @@ impl OrganFlow {
         Ok(ends)
     }
 
-    /// Bleeds for a time. 0 seconds only tell how fast.
+    /// Bleeds for a time. With 0 seconds only the rates are computed.
     pub(crate) fn step(
         &mut self,
         bleeding: &mut ByKind<Bleeding>,
@@ -180,12 +183,12 @@ impl OrganFlow {
         VesselKind::ALL.iter().filter_map(|&kind| self.networks.get(kind)).map(Network::len).sum()
     }
 
-    /// A copy to measure with.
+    /// A copy for measuring.
     pub(crate) fn copy(&self) -> Self {
         Self { networks: self.networks.clone(), trees: Arc::clone(&self.trees) }
     }
 
-    /// How the vessels are now, for a copy to be made equal: as much as there are gaps, however many vessels.
+    /// The present condition of the vessels, to be applied to a copy. Its size is that of the gaps, not of the vessels.
     pub(crate) fn condition(&self, blood: &BloodVolume) -> Condition {
         let of_kinds = ByKind::from_fn(|kind| match self.networks.get(kind) {
             Some(network) => {
@@ -197,7 +200,7 @@ impl OrganFlow {
         Condition { of_kinds, pressure_share: blood.pressure_share() }
     }
 
-    /// Makes this copy equal to the flow that a condition is of, at the mean of the pulse, and solves it altogether.
+    /// Applies a condition to this copy, at the mean of the pulse, and solves it.
     async fn solve_in(&mut self, condition: &Condition, pace: &Pace) -> Result<(), FlowError> {
         for (kind, (gaps, openings)) in condition.of_kinds.iter() {
             let Some(network) = self.networks.get_mut(kind) else { continue };
@@ -209,19 +212,19 @@ impl OrganFlow {
     }
 }
 
-/// What the flow in an organ depends on, its intact vessels aside.
+/// Everything that the flow in an organ depends on besides its intact vessels.
 #[derive(Clone, Debug)]
 pub(crate) struct Condition {
     /// Gaps of each kind, and how far each of its open ends is open.
     of_kinds: ByKind<(Vec<(NodeId, Interruption)>, Vec<f64>)>,
-    /// How much of their pressure the patient's roots have left.
+    /// Share of the root pressure that the patient has left.
     pressure_share: f64,
 }
 
-/// What an organ's tissue gets, against the intact organ.
+/// Measures the supply of an organ's tissue, relative to the intact organ.
 #[derive(Debug)]
 pub(crate) struct SupplyGauge {
-    /// A copy of its own, so that measuring holds up no frame.
+    /// A copy of its own, so that measuring blocks no frame.
     flow: OrganFlow,
     of_kinds: ByKind<Supply>,
     tissue: Option<TissueSupply>,
@@ -238,8 +241,8 @@ pub(crate) struct Measured {
 }
 
 impl SupplyGauge {
-    /// Measures from now on against what flows in the intact vessels of `flow`, whose gaps don't count. `vertices` are
-    /// the organ's, at rest.
+    /// Measures relative to the flow in the intact vessels of `flow`, without its gaps. `vertices` are the organ's, at
+    /// rest.
     pub(crate) async fn new(mut flow: OrganFlow, vertices: &[Vec3], pace: &Pace) -> Result<Self, FlowError> {
         let intact = Condition { of_kinds: ByKind::default(), pressure_share: 1.0 };
         flow.solve_in(&intact, &pace.part(0.0..0.3)).await?;
@@ -287,16 +290,16 @@ impl SupplyGauge {
     }
 }
 
-/// The kinds of vessels, each with its part of the work.
+/// The kinds of vessels, each with its part of the progress.
 fn each_kind(pace: &Pace) -> impl Iterator<Item = (VesselKind, Pace)> {
     let share = 1.0 / VesselKind::ALL.len() as f32;
     let part = move |index: usize| pace.part(index as f32 * share..(index + 1) as f32 * share);
     VesselKind::ALL.into_iter().enumerate().map(move |(index, kind)| (kind, part(index)))
 }
 
-/// What a blockage in the ledger is to the flow.
+/// The interruption of the flow by a blockage in the ledger.
 ///
-/// A hole keeps the radius that it was laid with, however its vessel has widened since, so that a clot in it stays.
+/// A hole keeps the radius that it was laid with, even if its vessel has widened since, so that a clot in it stays.
 fn interruption(blockage: &Blockage, radius: f32, laid: Option<Interruption>) -> Interruption {
     let new = blockage.interruption(radius);
     let keep = |now: Option<Outlet>, before: Option<Outlet>| now.and(before.or(now));

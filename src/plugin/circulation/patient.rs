@@ -1,4 +1,4 @@
-//! The blood of one patient, whom several organs may share.
+//! The blood of one patient, which several organs may share.
 
 use crate::synthesis::haemodynamics::{BloodVolume, BloodVolumeSettings, FlowError};
 use bevy::{
@@ -6,7 +6,7 @@ use bevy::{
     reflect::{Reflect, ReflectDeserialize, ReflectSerialize, std_traits::ReflectDefault},
 };
 
-/// The blood of one patient: whose loss lowers the pressure in all organs.
+/// The blood of one patient. Its loss lowers the pressure in all organs.
 ///
 /// Put it on an organ, or on an entity above several organs, which then share it. An organ that finds none on itself or
 /// above gets one of its own, with the default settings. To fill a patient up again, insert a new one.
@@ -21,7 +21,7 @@ impl Patient {
     /// A patient who has lost no blood.
     ///
     /// # Errors
-    /// When a setting is outside its limits.
+    /// If a setting is outside its limits.
     pub fn new(settings: BloodVolumeSettings) -> Result<Self, FlowError> {
         Ok(Self { blood: BloodVolume::new(settings)? })
     }
@@ -38,7 +38,7 @@ impl Default for Patient {
     }
 }
 
-/// The patient whom an organ belongs to: itself, or the nearest above it.
+/// The patient of an organ: the organ itself, or the nearest patient above it.
 pub(crate) fn patient_of(
     organ: Entity,
     parents: &Query<&ChildOf>,

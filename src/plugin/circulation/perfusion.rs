@@ -1,6 +1,9 @@
-//! What makes blood flow in an organ's vessels, and what is known of it: settings, loss and supply.
+//! The settings of the blood flow in an organ's vessels, and its results: loss and supply.
 
-use crate::plugin::{circulation::flow::CirculationState, surgery::ledgers::Cuttable};
+use crate::plugin::{
+    circulation::{organ_flow::Hydraulics, state::CirculationState},
+    surgery::cuttable::Cuttable,
+};
 use crate::synthesis::{
     haemodynamics::{BedSettings, BleedingSettings, FlowSettings, RootPressure, ViscosityLaw},
     tree::{ByKind, VesselKind},
@@ -11,12 +14,12 @@ use bevy::{
     reflect::{Reflect, std_traits::ReflectDefault},
 };
 
-/// Fills an organ's vessels with blood: put it beside the organ's [`Vasculature`](crate::plugin::Vasculature), and what
-/// is cut open bleeds.
+/// Fills an organ's vessels with blood, so that open ends bleed. Put it beside the organ's
+/// [`Vasculature`](crate::plugin::Vasculature).
 ///
-/// Blood flows once the vessels have grown; those of fewer than 8192 nodes while they grow, too. As long as nothing is
-/// open it costs nothing. A change of a setting takes effect at the next frame: what is open goes on bleeding, but other
-/// settings of the bleeding begin the clotting anew. Of several vessel entities of one kind the first has blood.
+/// Blood flows once the vessels have grown; with fewer than 8192 nodes, also while they grow. It costs nothing while no
+/// end is open. A changed setting takes effect at the next frame: open ends go on bleeding, but changed bleeding
+/// settings restart the clotting. If several vessel entities have one kind, the first has blood.
 ///
 /// Flow is that of the organ at rest: neither its transform nor its deformation changes it.
 ///
@@ -32,13 +35,13 @@ use bevy::{
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(Cuttable, CirculationState, BloodLoss, OrganSupply)]
 pub struct Perfusion {
-    /// How long a unit of the organ's mesh is. Flow rises with its cube: a wrong scale shows at once.
+    /// Length of a unit of the organ's mesh. Flow rises with its cube, so a wrong scale is easily seen.
     ///
     /// The scale of the organ's transform doesn't count. Default: [`Scale::METRES`], as in glTF files and Bevy's worlds.
     pub scale: Scale,
-    /// How viscosity depends on the diameter. Default: [`ViscosityLaw::IN_VIVO`].
+    /// How viscosity depends on vessel diameter. Default: [`ViscosityLaw::IN_VIVO`].
     pub viscosity: ViscosityLaw,
-    /// Pressure at the arteries' roots; a [`Pulse`](crate::synthesis::haemodynamics::Pulse) makes them spurt.
+    /// Pressure at the arteries' roots; a [`Pulse`](crate::synthesis::haemodynamics::Pulse) makes open ends spurt.
     ///
     /// Default: constant, [`FlowSettings::DEFAULT_ARTERIAL_PRESSURE`].
     pub arterial_pressure: RootPressure,
@@ -52,13 +55,14 @@ pub struct Perfusion {
     pub portal_bed: BedSettings,
     /// The capillary bed behind the terminals of arteries and veins.
     ///
-    /// With a resistance, arteries and veins of an organ that grew are joined where an artery supplied a drain that a
-    /// vein then drained, so that one side feels what the other loses; each frame then takes several sweeps over both
-    /// trees. Without, each side drains into the bed by itself, and a frame costs only as much as there are open ends.
+    /// With a resistance, the arteries and veins of an organ that grew are joined where an artery supplied a drain that
+    /// a vein then drained, so a loss on one side affects the other. Each frame then takes several sweeps over both
+    /// trees. Without a resistance, each side ends in the bed on its own, and the cost of a frame depends only on the
+    /// number of open ends.
     ///
     /// Default: without a resistance.
     pub bed: BedSettings,
-    /// Pressure outside the vessels. Default: that of the air, 0.
+    /// Pressure outside the vessels. Default: atmospheric, 0.
     pub ambient: Pressure,
     /// Discharge coefficient of open ends. Limits: > 0, at most 1. Default:
     /// [`FlowSettings::DEFAULT_DISCHARGE_COEFFICIENT`].
@@ -67,22 +71,22 @@ pub struct Perfusion {
     pub bleeding: BleedingSettings,
     /// Supply below which tissue counts as ischaemic. Limits: 0 to 1. Default: [`Self::DEFAULT_ISCHAEMIC_BELOW`].
     pub ischaemic_below: f32,
-    /// Least time between two measurements of the supply while something bleeds; after an action it is measured at once.
-    /// Each is a sweep over the whole tree, for large ones beside the frames.
+    /// Shortest time between two measurements of the supply while something bleeds; after an action it is measured at
+    /// once. Each is a sweep over the whole tree, in a job for large ones.
     ///
     /// Units: seconds. Limits: ≥ 0. Default: [`Self::DEFAULT_SUPPLY_INTERVAL`].
     pub supply_interval: f32,
-    /// Whether time stands still for the blood of this organ. Default: false.
+    /// Whether time stops for the blood of this organ. Default: false.
     pub paused: bool,
 }
 
 impl Perfusion {
-    /// Default of [`ischaemic_below`](Self::ischaemic_below): half of what the intact organ has.
+    /// Default of [`ischaemic_below`](Self::ischaemic_below): half the supply of the intact organ.
     pub const DEFAULT_ISCHAEMIC_BELOW: f32 = 0.5;
     /// Default of [`supply_interval`](Self::supply_interval), in seconds.
     pub const DEFAULT_SUPPLY_INTERVAL: f32 = 0.5;
 
-    /// What the flow in vessels of a kind depends on; `None` for those that carry no blood.
+    /// The flow settings of a kind of vessels; `None` for those that carry no blood.
     pub fn flow_settings(&self, kind: VesselKind) -> Option<FlowSettings> {
         let (root, bed) = match kind {
             VesselKind::Artery => (self.arterial_pressure, self.bed),
@@ -92,6 +96,11 @@ impl Perfusion {
         };
         let Self { scale, viscosity, ambient, discharge_coefficient, .. } = *self;
         Some(FlowSettings { scale, viscosity, root, bed, ambient, discharge_coefficient })
+    }
+
+    /// The same for all kinds.
+    pub(crate) fn hydraulics(&self) -> Hydraulics {
+        ByKind::from_fn(|kind| self.flow_settings(kind))
     }
 }
 
@@ -116,22 +125,22 @@ impl Default for Perfusion {
     }
 }
 
-/// What an organ bleeds. For reading: the plugin writes it, and goes on from what it finds, so that inserting a new one
-/// begins the count anew.
+/// The blood that an organ loses. Read-only: the plugin writes it, and adds to the present values, so inserting a new
+/// one restarts the count.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct BloodLoss {
-    /// All that it has lost.
+    /// Total loss.
     pub total: Volume,
-    /// What it loses, as a mean over the last frame.
+    /// Rate of loss, as a mean over the last frame.
     pub rate: Flow,
-    /// The same of each kind of vessels.
+    /// The same for each kind of vessels.
     pub rates: ByKind<Flow>,
-    /// Number of ends that bleed.
+    /// Number of bleeding ends.
     pub bleeding_ends: usize,
 }
 
-/// How much blood reaches the tissue of an organ, against the intact organ. For reading: the plugin writes it.
+/// The blood that reaches the tissue of an organ, relative to the intact organ. Read-only: the plugin writes it.
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct OrganSupply {
@@ -142,11 +151,11 @@ pub struct OrganSupply {
     pub ischaemic_share: f32,
 }
 
-/// How much blood flows through the segments of a vessel entity, against the intact vessels. For reading: the plugin
-/// writes it.
+/// The blood flow through the segments of a vessel entity, relative to the intact vessels. Read-only: the plugin writes
+/// it.
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct SegmentSupply {
-    /// Supply of every segment by the node that it ends in, from 0 to 1. Segments that grew later are missing.
+    /// Supply of every segment, indexed by its end node, from 0 to 1. Segments that grew later are missing.
     pub segments: Vec<f32>,
 }

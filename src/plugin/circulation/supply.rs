@@ -1,22 +1,22 @@
 //! Circulate: which tissue still gets blood.
 //!
 //! In: the flow of an organ. Out: [`SegmentSupply`] on its vessel entities and [`OrganSupply`] on the organ, after each
-//! action and, while something bleeds, now and then. It is measured in jobs.
+//! action and, while something bleeds, at intervals. Jobs measure it.
 
 use crate::plugin::vessels::tree::Vessels;
 use crate::plugin::{
     circulation::{
-        flow::CirculationState,
-        messages::CirculationError,
-        organ_flow::{Condition, Measured, OrganFlow, SupplyGauge},
+        gauge::Outcome,
+        organ_flow::{Condition, OrganFlow, SupplyGauge},
         patient::{Patient, patient_of},
         perfusion::{OrganSupply, Perfusion, SegmentSupply},
+        state::CirculationState,
     },
     job::{Job, JobPanic, Jobs},
     organ::{mesh::vertex_positions, rest::RestMesh},
     vessels::relations::OrganVessels,
 };
-use crate::synthesis::{haemodynamics::FlowError, pace::Pace};
+use crate::synthesis::pace::Pace;
 use bevy::{
     asset::Assets,
     ecs::{
@@ -31,70 +31,14 @@ use bevy::{
     mesh::{Mesh, Mesh3d},
 };
 
-/// A gauge, with what it has measured.
-type Outcome = Result<(Box<SupplyGauge>, Measured), FlowError>;
-
-/// When the supply of an organ is measured, and with what.
-#[derive(Debug, Default)]
-pub(crate) struct Gauge {
-    /// `None` before the first measurement, and while the job has it.
-    gauge: Option<Box<SupplyGauge>>,
-    job: Option<Job<Outcome>>,
-    /// Whether the organ's vessels have grown, so that there is something to measure.
-    is_ready: bool,
-    /// Whether something was done to the vessels since it was measured.
-    is_due: bool,
-    /// Seconds since it was measured.
-    age: f64,
-    /// Whether blood was lost since.
-    bled: bool,
-}
-
-impl Gauge {
-    /// Measures as soon as can be.
-    pub(crate) fn ready() -> Self {
-        Self { is_ready: true, is_due: true, ..Self::default() }
-    }
-
-    /// Measures after an action.
-    pub(crate) fn demand(&mut self) {
-        self.is_due = true;
-    }
-
-    /// Takes note of time that passed.
-    pub(crate) fn pass(&mut self, seconds: f64, bled: bool) {
-        self.age += seconds;
-        self.bled |= bled;
-    }
-
-    fn is_to_begin(&self, interval: f32) -> bool {
-        let is_old = self.bled && self.age >= f64::from(interval);
-        self.is_ready && self.job.is_none() && (self.is_due || is_old)
-    }
-
-    /// Hands out what is measured with, and begins to count anew.
-    fn begin(&mut self) -> Option<Box<SupplyGauge>> {
-        let gauge = self.gauge.take();
-        *self = Self { is_ready: true, ..Self::default() };
-        gauge
-    }
-
-    /// What has been measured, and keeps what it was measured with.
-    fn accept(&mut self, outcome: Result<Outcome, JobPanic>) -> Result<Measured, CirculationError> {
-        let (gauge, measured) = outcome??;
-        self.gauge = Some(gauge);
-        Ok(measured)
-    }
-}
-
-/// All that a measurement takes.
+/// All inputs of a measurement.
 struct Order {
     source: Source,
     condition: Condition,
     ischaemic_below: f32,
 }
 
-/// What is measured with: the first time, it is to be made from a copy of the flow and the organ's vertices.
+/// The gauge, or for the first measurement what it is made from: a copy of the flow and the organ's vertices.
 enum Source {
     Gauge(Box<SupplyGauge>),
     New { flow: Box<OrganFlow>, vertices: Vec<Vec3> },
@@ -127,7 +71,7 @@ pub(crate) struct Supplied {
     rest: Option<&'static RestMesh>,
 }
 
-/// Begins measurements that are due, and writes those that have ended.
+/// Starts measurements that are due, and writes those that are done.
 pub(crate) fn measure_supply(
     mut organs: Query<Supplied>,
     mut vessels: Query<(&Vessels, &mut SegmentSupply)>,
@@ -141,7 +85,7 @@ pub(crate) fn measure_supply(
             organ.clear(&mut vessels);
             continue;
         }
-        if organ.state.gauge.is_to_begin(organ.perfusion.supply_interval) {
+        if organ.state.gauge.is_to_begin(organ.perfusion.supply_interval, organ.perfusion.ischaemic_below) {
             let patient = patient_of(organ.entity, &parents, |entity| patients.contains(entity));
             let patient = patient.and_then(|patient| patients.get(patient).ok()).copied().unwrap_or_default();
             organ.begin(&patient, meshes.as_deref(), &jobs);
@@ -153,10 +97,10 @@ pub(crate) fn measure_supply(
 }
 
 impl SuppliedItem<'_, '_> {
-    /// Begins a measurement, if blood flows.
+    /// Starts a measurement, if blood flows.
     fn begin(&mut self, patient: &Patient, meshes: Option<&Assets<Mesh>>, jobs: &Jobs) {
         let state = self.state.bypass_change_detection();
-        let gauge = state.gauge.begin();
+        let gauge = state.gauge.begin(self.perfusion.ischaemic_below);
         let Some(flow) = state.flow() else { return };
         let condition = flow.condition(&patient.blood);
         let mut work = flow.nodes();
@@ -172,7 +116,7 @@ impl SuppliedItem<'_, '_> {
         self.state.bypass_change_detection().gauge.job = Some(jobs.start(work, |pace| order.carry_out(pace)));
     }
 
-    /// The organ's vertices, at rest where it is known how that is; none without a mesh that can be read.
+    /// The organ's vertices, at rest if the rest shape is known; none without a readable mesh.
     fn vertices(&self, meshes: Option<&Assets<Mesh>>) -> Vec<Vec3> {
         if let Some(rest) = self.rest.and_then(RestMesh::positions) {
             return rest.to_vec();
@@ -182,7 +126,7 @@ impl SuppliedItem<'_, '_> {
             .map_or_else(Vec::new, |positions| positions.iter().map(|&at| at.into()).collect())
     }
 
-    /// Nothing is known of vessels that grow.
+    /// Clears the supply of vessels that grow.
     fn clear(&mut self, vessels: &mut Query<(&Vessels, &mut SegmentSupply)>) {
         self.supply.set_if_neq(OrganSupply::default());
         let mut vessels = vessels.iter_many_mut(self.vessels.entities());

@@ -1,12 +1,13 @@
-//! Vessels bound to an organ at rest, and moved with it.
+//! Vessels are bound to an organ at rest, and move with it.
 //!
-//! In: the organ at rest, and where its vertices are. Out: [`Vessels`] with moved nodes, and all that goes by where they
-//! are. Binding is done in jobs.
+//! In: the organ at rest, and its present vertices. Out: [`Vessels`] with moved nodes, and everything that depends on
+//! their positions. Jobs do the binding.
 
 use crate::plugin::{
     job::{Job, Jobs},
+    lineage::Lineage,
     organ::mesh::MeshCopy,
-    vessels::{change_log::ChangeLog, lineage::Lineage, tree::Vessels},
+    vessels::{change_log::ChangeLog, tree::Vessels},
 };
 use crate::synthesis::{
     binding::{Binding, BindingError},
@@ -28,7 +29,7 @@ use bevy::{
 };
 use std::sync::Arc;
 
-/// An organ at rest: what nodes are bound to.
+/// An organ at rest, to which nodes are bound.
 #[derive(Clone)]
 pub(crate) enum RestOrgan {
     Surface(Arc<MeshCopy>),
@@ -36,7 +37,7 @@ pub(crate) enum RestOrgan {
 }
 
 impl RestOrgan {
-    /// Triangles or tetrahedra.
+    /// Number of triangles or tetrahedra.
     fn elements(&self) -> usize {
         match self {
             Self::Surface(mesh) => mesh.triangles.len(),
@@ -44,7 +45,8 @@ impl RestOrgan {
         }
     }
 
-    /// `None` where it is no organ. The tissue is prepared from the same triangles, and says what is wrong with them.
+    /// `None` if the triangles are not valid. The tissue is prepared from the same triangles, and reports what is
+    /// wrong.
     async fn bind(&self, tree: &VesselTree, pace: &Pace) -> Option<Binding> {
         match self {
             Self::Surface(mesh) => {
@@ -62,11 +64,11 @@ impl RestOrgan {
 pub(crate) struct VesselBinding {
     binding: Option<Binding>,
     job: Option<Job<Option<Binding>>>,
-    /// What it was made for.
+    /// The organ and vessels that it was made for.
     made_for: Option<MadeFor>,
 }
 
-/// What a binding is made for. Nodes shift a little while they grow, so grown ones are bound again.
+/// The organ and vessels of a binding. Nodes shift a little while they grow, so they are bound again once grown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct MadeFor {
     vessels: Lineage,
@@ -74,7 +76,7 @@ struct MadeFor {
     is_grown: bool,
 }
 
-/// Vessels that follow.
+/// Vessels that follow their organ.
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(crate) struct Bound {
@@ -92,14 +94,14 @@ pub(crate) struct Motion<'a> {
     pub(crate) lineage: Lineage,
     /// Whether its vessels have grown.
     pub(crate) is_grown: bool,
-    /// Whether vertices are elsewhere than in the last frame.
+    /// Whether vertices have moved since the last frame.
     pub(crate) has_moved: bool,
-    /// Where they are, `None` for at rest.
+    /// The vertices, `None` for those at rest.
     pub(crate) vertices: Option<&'a [Vec3]>,
 }
 
 impl Motion<'_> {
-    /// Moves an organ's vessel entities as far as that is due. One that can't be moved doesn't keep the others from it.
+    /// Moves an organ's vessel entities if they need it. One that can't be moved doesn't stop the others.
     pub(crate) fn carry_along(
         &self,
         vessels: &[Entity],
@@ -119,8 +121,7 @@ impl Motion<'_> {
 }
 
 impl BoundItem<'_, '_> {
-    /// Binds the vessels to the organ at rest where that is due. Says whether there is a new
-    /// binding.
+    /// Binds the vessels to the organ at rest if they need it. Returns whether there is a new binding.
     fn bind(&mut self, motion: &Motion, jobs: &Jobs) -> bool {
         let made_for = MadeFor { vessels: self.vessels.lineage(), organ: motion.lineage, is_grown: motion.is_grown };
         let binding = &mut *self.binding;
@@ -144,7 +145,7 @@ impl BoundItem<'_, '_> {
         true
     }
 
-    /// Moves the vessels with the vertices; `None` for back to rest.
+    /// Moves the vessels with the vertices; `None` brings them back to rest.
     fn follow(&mut self, vertices: Option<&[Vec3]>) -> Result<(), BindingError> {
         match (vertices, &mut self.binding.binding) {
             (None, _) => self.come_to_rest(),

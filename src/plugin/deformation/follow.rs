@@ -1,15 +1,16 @@
-//! Vessels follow an organ that is deformed: its mesh, or the tetrahedra of its inside.
+//! Vessels follow a deformed organ: its mesh, or the tetrahedra that fill it.
 //!
-//! In: the organ's mesh asset or its [`FollowsTetrahedra`], whose positions someone writes. Out: [`Vessels`] with moved
-//! nodes. Growth goes on at rest: what grows is bound to the organ as it was then, and moved from there.
+//! In: the organ's mesh asset or its [`FollowsTetrahedra`], with positions written by the app. Out: [`Vessels`] with
+//! moved nodes. Growth goes on at rest: new nodes are bound to the organ at rest, and moved from there.
 
 use crate::plugin::organ::rest::RestMesh;
 use crate::plugin::{
     deformation::bound::{Bound, Motion, RestOrgan, VesselBinding},
     growth::{progress::GrowthProgress, state::GrowthState},
     job::Jobs,
+    lineage::Lineage,
     organ::mesh::{copy_mesh, vertex_positions},
-    vessels::{lineage::Lineage, relations::OrganVessels, tree::Vessels},
+    vessels::{relations::OrganVessels, tree::Vessels},
 };
 use crate::synthesis::mesh::TetMesh;
 use bevy::{
@@ -32,36 +33,37 @@ use bevy::{
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Lets an organ's vessels follow its mesh: put it beside the organ's [`Vasculature`](crate::plugin::Vasculature), and
-/// write new positions of the vertices into the mesh asset, each frame if need be, as a soft body does.
+/// Lets an organ's vessels follow its mesh. Put it beside the organ's [`Vasculature`](crate::plugin::Vasculature), and
+/// write new vertex positions into the mesh asset, each frame if needed, as a soft body does.
 ///
-/// New positions no longer start the growth again; another number of vertices, or another mesh asset, still does. The
-/// organ is at rest as its mesh is when its tissue is prepared, or when this is added later. Vessels may still grow: they
-/// do so at rest, and are moved from there.
+/// New positions then don't start the growth again, but another number of vertices or another mesh asset does. The
+/// organ's rest shape is that of its mesh when its tissue is prepared, or when this is added later. Vessels may still
+/// grow: they do so at rest, and are moved from there.
 ///
-/// Write the mesh before [`VesselSystems::Publish`](crate::plugin::VesselSystems::Publish), and the vessels follow in the
-/// same frame; later, they follow in the next. The mesh must keep its data in main memory
-/// (`RenderAssetUsages::MAIN_WORLD`), and have its own asset: organs that share one move alike. Radii, flow and what is
-/// ischaemic stay as they are at rest. Removing this brings the vessels back to rest.
+/// If the mesh is written before [`VesselSystems::Publish`](crate::plugin::VesselSystems::Publish), the vessels follow
+/// in the same frame, otherwise in the next. The mesh must keep its data in main memory
+/// (`RenderAssetUsages::MAIN_WORLD`), and be an asset of its own: organs that share one move alike. Radii, flow and
+/// ischaemia stay as they are at rest. Removing this brings the vessels back to rest.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(RestMesh)]
 pub struct FollowsMesh;
 
-/// Lets an organ's vessels follow tetrahedra that fill it, as a soft body has them: put it beside the organ's
+/// Lets an organ's vessels follow tetrahedra that fill it, such as those of a soft body. Put it beside the organ's
 /// [`Vasculature`](crate::plugin::Vasculature), and write [`positions_mut`](Self::positions_mut) each frame.
 ///
-/// Vessels inside a solid organ move with the tissue around them, where [`FollowsMesh`] knows its surface alone. Each node
-/// follows the tetrahedron that holds it: exactly, where that is stretched and sheared. Nodes outside all of them, such as
-/// those of vessels that stand off the surface, follow the nearest.
+/// Vessels inside a solid organ move with the tissue around them, whereas [`FollowsMesh`] uses its surface alone. Each
+/// node follows the tetrahedron that holds it, exactly, even if that is stretched and sheared. Nodes outside all of
+/// them, such as those of vessels lifted off the surface, follow the nearest.
 ///
-/// All positions are in the local space of the organ's mesh, and [`rest`](Self::rest) is the organ in which vessels grow.
-/// The mesh may be deformed as well, by whoever draws it: as with [`FollowsMesh`], that doesn't start the growth again. An
-/// organ with both follows the tetrahedra. To change the tetrahedra themselves, after a remeshing for example, insert
-/// another one of these, with the tetrahedra as they lie in the organ at rest.
+/// All positions are in the local space of the organ's mesh, and vessels grow in the organ at [`rest`](Self::rest). The
+/// app may also deform the mesh, to draw it: as with [`FollowsMesh`], that doesn't start the growth again. An organ
+/// with both follows the tetrahedra. To change the tetrahedra themselves, after a remeshing for example, insert a new
+/// component, with the tetrahedra of the organ at rest.
 ///
-/// Written before [`VesselSystems::Publish`](crate::plugin::VesselSystems::Publish), vessels follow in the same frame. Radii,
-/// flow and what is ischaemic stay as they are at rest. Removing this brings the vessels back to rest.
+/// If the positions are written before [`VesselSystems::Publish`](crate::plugin::VesselSystems::Publish), the vessels
+/// follow in the same frame. Radii, flow and ischaemia stay as they are at rest. Removing this brings the vessels back
+/// to rest.
 ///
 /// ```
 /// # use bevy_vessels::{plugin::FollowsTetrahedra, synthesis::mesh::{TetMesh, TetMeshError}};
@@ -116,7 +118,7 @@ impl TryFrom<SavedTetrahedra> for FollowsTetrahedra {
 }
 
 impl FollowsTetrahedra {
-    /// Tetrahedra that are at rest. [`TetMesh::new`] says what is wrong with those that can't be followed.
+    /// Tetrahedra at rest. [`TetMesh::new`] has rejected those that can't be followed.
     pub fn new(rest: impl Into<Arc<TetMesh>>) -> Self {
         let rest = rest.into();
         Self { lineage: Lineage::new_one(), positions: rest.positions().to_vec(), rest }
@@ -127,12 +129,12 @@ impl FollowsTetrahedra {
         &self.rest
     }
 
-    /// Where the vertices of the tetrahedra are.
+    /// The present vertices of the tetrahedra.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
     }
 
-    /// The same, to be written. Where one isn't finite nothing moves, and the log says so once.
+    /// The same, to be written. If one isn't finite, nothing moves, and the log says so once.
     pub fn positions_mut(&mut self) -> &mut [Vec3] {
         &mut self.positions
     }
@@ -141,7 +143,7 @@ impl FollowsTetrahedra {
 /// Organs whose vessels follow them.
 type Deforming = Or<(With<FollowsMesh>, With<FollowsTetrahedra>)>;
 
-/// Source: an organ is at rest as it is when its tissue is prepared.
+/// Source: takes the rest shape of an organ when its tissue is prepared.
 pub(crate) fn take_rest(
     meshes: Res<Assets<Mesh>>,
     mut organs: Query<(Entity, &Mesh3d, Option<&GrowthState>, &mut RestMesh), Deforming>,
@@ -159,7 +161,7 @@ pub(crate) fn take_rest(
     }
 }
 
-/// Publish: gives a binding to the vessels of organs that are followed.
+/// Publish: gives a binding to vessels that follow their organ.
 pub(crate) fn attach_bindings(
     mut commands: Commands,
     organs: Query<&OrganVessels, Deforming>,
@@ -170,7 +172,7 @@ pub(crate) fn attach_bindings(
     }
 }
 
-/// An organ whose mesh is followed.
+/// An organ whose vessels follow its mesh.
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(crate) struct FollowedMesh {
@@ -181,7 +183,7 @@ pub(crate) struct FollowedMesh {
     rest: &'static mut RestMesh,
 }
 
-/// Publish: vessels go where their organ's mesh is.
+/// Publish: moves vessels with their organ's mesh.
 pub(crate) fn follow_meshes(
     meshes: Option<Res<Assets<Mesh>>>,
     mut organs: Query<FollowedMesh, (With<FollowsMesh>, Without<FollowsTetrahedra>)>,
@@ -196,7 +198,7 @@ pub(crate) fn follow_meshes(
             continue;
         };
         if vertices.len() != copy.positions.len() {
-            // The tissue of a mesh that is another one is being prepared; vessels that did not grow have none.
+            // A new mesh gets a new tissue, so only vessels that did not grow need the warning.
             if organ.progress.is_none() {
                 organ.rest.warn(organ.entity, "its mesh has another number of vertices than it had at rest");
             }
@@ -217,7 +219,7 @@ pub(crate) fn follow_meshes(
     }
 }
 
-/// An organ whose tetrahedra are followed.
+/// An organ whose vessels follow its tetrahedra.
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(crate) struct FollowedTetrahedra {
@@ -228,7 +230,7 @@ pub(crate) struct FollowedTetrahedra {
     rest: &'static mut RestMesh,
 }
 
-/// Publish: vessels go where their organ's tetrahedra are.
+/// Publish: moves vessels with their organ's tetrahedra.
 pub(crate) fn follow_tetrahedra(mut organs: Query<FollowedTetrahedra>, mut bound: Query<Bound>, jobs: Jobs) {
     for mut organ in &mut organs {
         let tetrahedra = &organ.tetrahedra;
@@ -246,7 +248,7 @@ pub(crate) fn follow_tetrahedra(mut organs: Query<FollowedTetrahedra>, mut bound
     }
 }
 
-/// Vessels that no longer follow come to rest, unless there is another way in which they follow.
+/// Brings vessels back to rest when a component that they followed is removed, unless they also follow the other.
 pub(crate) fn release_vessels<Followed: Component, Other: Component>(
     removed: On<Remove, Followed>,
     organs: Query<(Option<&OrganVessels>, Has<Other>)>,

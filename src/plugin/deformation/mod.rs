@@ -48,7 +48,7 @@ impl Plugin for DeformationPlugin {
         app.add_systems(
             self.schedule,
             (
-                // An organ is at rest as it is when its tissue is prepared.
+                // The rest shape is taken when the tissue is prepared.
                 follow::take_rest.in_set(VesselSystems::Source).after(source::begin),
                 follow.chain().in_set(VesselSystems::Follow),
             ),

@@ -1,4 +1,4 @@
-//! What growth may cost in a frame, what it did cost, and what it is expected to cost.
+//! The time that growth may take in a frame, the time it took, and the time it is expected to take.
 
 use bevy::{
     ecs::{change_detection::ResMut, reflect::ReflectResource, resource::Resource},
@@ -6,17 +6,17 @@ use bevy::{
 };
 use std::time::Duration;
 
-/// How much all growing organs together may do in a frame. Change it at any time.
+/// How much work all growing organs together may do in a frame. It may be changed at any time.
 ///
-/// Whatever it says, one step is done in each frame as long as any organ grows, so growth always comes to its end.
+/// At least one step is done in each frame while any organ grows, so growth always finishes.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub enum GrowthBudget {
-    /// The time for everything that growth does in a frame: starting growths, which takes half of it at most, steps, and
-    /// publishing what they changed. No step begins that is expected to end later, but for the first; and one growth is
-    /// always started, where any waits to be.
+    /// The time for everything that growth does in a frame: starting growths (at most half of it), steps, and
+    /// publishing their changes. After the first, no step begins that is expected to end too late. One waiting growth
+    /// is always started.
     Time(Duration),
-    /// This many steps, each organ's counted, and all starts. Of use where frames are to be the same on every machine.
+    /// This many steps, summed over all organs, and all starts. Use it where frames must be the same on every machine.
     Steps(u32),
 }
 
@@ -24,10 +24,10 @@ impl GrowthBudget {
     /// Default time: an eighth of a frame at 60 frames a second.
     pub const DEFAULT_TIME: Duration = Duration::from_millis(2);
 
-    /// Whether another step may begin after this many steps, where the frame's work is expected to have taken `until` at
-    /// its end.
+    /// Whether another step may begin after this many steps. `until` is the time that the frame's work is expected to
+    /// have taken when that step ends.
     ///
-    /// The time is asked for only where it matters.
+    /// `until` is called only if the time matters.
     pub fn allows(self, steps: u32, until: impl FnOnce() -> Duration) -> bool {
         steps == 0
             || match self {
@@ -36,7 +36,7 @@ impl GrowthBudget {
             }
     }
 
-    /// The same for starts, of which there may be any number where steps are counted.
+    /// The same for starts. [`Steps`](Self::Steps) does not limit their number.
     pub(crate) fn allows_start(self, starts: u32, until: impl FnOnce() -> Duration) -> bool {
         match self {
             Self::Time(time) => Self::Time(time / 2).allows(starts, until),
@@ -51,38 +51,38 @@ impl Default for GrowthBudget {
     }
 }
 
-/// What growth did in the last frame, and how long that took.
+/// What growth did in the last frame, and how long it took.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Resource, Default, Clone, PartialEq)]
 pub struct GrowthFrame {
     /// Steps, over all organs.
     pub steps: u32,
-    /// Time for starting growths: copies of meshes, and the planting of roots. Tissues are prepared beside the frames.
+    /// Time for starting growths: copying meshes and planting roots. Tissues are prepared in jobs, outside this time.
     pub start_time: Duration,
-    /// Time for the steps, and for the radii that follow from them.
+    /// Time for the steps, and for the radii that result from them.
     pub step_time: Duration,
     /// Time for bringing vessel entities up to date.
     pub publish_time: Duration,
 }
 
 impl GrowthFrame {
-    /// Everything that the [`GrowthBudget`] is for.
+    /// Total time that counts against the [`GrowthBudget`].
     pub fn time(&self) -> Duration {
         self.start_time + self.step_time + self.publish_time
     }
 }
 
-/// The last costs of something that is done again and again.
+/// The last costs of repeated work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct LastCosts([Duration; 3]);
 
 impl LastCosts {
-    /// Takes in another one.
+    /// Adds a cost and drops the oldest.
     pub(crate) fn add(&mut self, cost: Duration) {
         self.0 = [self.0[1], self.0[2], cost];
     }
 
-    /// What the next one will cost: the median, which an interrupted one doesn't change. Zero as long as too few are known.
+    /// Expected cost of the next one: the median, which one interruption doesn't change. Zero while too few are known.
     pub(crate) fn expected(&self) -> Duration {
         let [a, b, c] = self.0;
         a.max(b).min(a.min(b).max(c))
@@ -94,20 +94,56 @@ impl LastCosts {
 pub(crate) struct StepCost {
     /// The step itself.
     pub(crate) step: Duration,
-    /// Settling the radii and publishing what it changed, later in the frame.
+    /// Settling the radii and publishing the changes, later in the frame.
     pub(crate) publish: Duration,
 }
 
-/// Lets those that take turns, in rising order, begin with the one after the `last` that had one.
+/// Costs of one growth's past steps.
+#[derive(Debug, Default)]
+pub(crate) struct Costs {
+    steps: LastCosts,
+    /// Settling and publishing, for each step that was published.
+    publishing: LastCosts,
+    /// Settling, since the vessels were last published.
+    settling: Duration,
+    /// Steps that haven't been published.
+    unpublished: u32,
+}
+
+impl Costs {
+    pub(crate) fn note_step(&mut self, cost: Duration) {
+        self.steps.add(cost);
+        self.unpublished += 1;
+    }
+
+    pub(crate) fn note_settling(&mut self, cost: Duration) {
+        self.settling += cost;
+    }
+
+    /// Records the cost of publishing the steps since the last time.
+    pub(crate) fn note_publishing(&mut self, cost: Duration) {
+        let cost = cost + std::mem::take(&mut self.settling);
+        if let Some(each) = cost.checked_div(std::mem::take(&mut self.unpublished)) {
+            self.publishing.add(each);
+        }
+    }
+
+    /// Expected cost of the next step.
+    pub(crate) fn expected(&self) -> StepCost {
+        StepCost { step: self.steps.expected(), publish: self.publishing.expected() }
+    }
+}
+
+/// Rotates a round, sorted in rising order, so that it begins with the one after the `last` to have had a turn.
 pub(crate) fn begin_after<T: Ord + Copy, C>(round: &mut [(T, C)], last: Option<T>) {
     let next = last.map_or(0, |last| round.partition_point(|&(organ, _)| organ <= last));
     round.rotate_left(if next == round.len() { 0 } else { next });
 }
 
-/// Gives each of a round a step in turn as long as the budget allows. `step` gives the cost of that one's next step, if it
-/// has more to do. `spent` is what the frame has taken so far.
+/// Gives each member of a round a step in turn while the budget allows. `step` returns the cost of the member's next
+/// step, if it has one. `spent` is the time that the frame has taken so far.
 ///
-/// Gives the number of steps done.
+/// Returns the number of steps done.
 pub(crate) fn share_out<T: Copy>(
     budget: GrowthBudget,
     mut round: Vec<(T, StepCost)>,
@@ -136,7 +172,7 @@ pub(crate) fn share_out<T: Copy>(
     steps
 }
 
-/// Begins a frame's account.
+/// Resets the account at the start of a frame.
 pub(crate) fn begin_frame(mut frame: ResMut<GrowthFrame>) {
     *frame = GrowthFrame::default();
 }
@@ -148,7 +184,7 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
-    /// Steps done in one frame of `budget`, where each takes `takes` and is expected to take `expected`.
+    /// Steps done in one frame of `budget` if each takes `takes` and is expected to take `expected`.
     fn steps_in(budget: Duration, takes: Duration, expected: StepCost) -> (u32, Duration) {
         let clock = Cell::new(Duration::ZERO);
         let steps = share_out(
@@ -168,9 +204,9 @@ mod tests {
         let cost = |step, publish| StepCost { step, publish };
         assert_eq!(steps_in(2 * MS, MS / 2, cost(MS / 2, Duration::ZERO)), (4, 2 * MS));
         assert_eq!(steps_in(2 * MS, MS * 3 / 4, cost(MS * 3 / 4, Duration::ZERO)), (2, MS * 3 / 2));
-        // half of what is done is published later: that time is kept free
+        // publishing takes half of the time: it is kept free
         assert_eq!(steps_in(2 * MS, MS / 4, cost(MS / 4, MS / 4)), (4, MS));
-        // without knowledge a step may overrun, once
+        // with unknown costs one step may overrun
         assert_eq!(steps_in(2 * MS, 3 * MS / 2, StepCost::default()), (2, 3 * MS));
     }
 
@@ -215,7 +251,7 @@ mod tests {
     fn organs_take_turns_within_and_across_frames() {
         assert_fair(GrowthBudget::Steps(2), [MS; 3], 30);
         assert_fair(GrowthBudget::Time(2 * MS), [MS / 10, MS * 3 / 4, MS / 3], 30);
-        // one whose steps don't fit in a frame is neither favoured nor left behind
+        // an organ whose steps don't fit in a frame is neither favoured nor left behind
         assert_fair(GrowthBudget::Time(2 * MS), [MS, 5 * MS, MS / 2], 60);
     }
 

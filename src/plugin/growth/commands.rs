@@ -18,10 +18,10 @@ use bevy::{
 
 /// Commands for organs.
 pub trait EntityCommandsExt {
-    /// Grows the organ's vessels to their end at once, when the command is applied: prepares the tissue and does all
-    /// steps, however long that takes, paused or not. The vessels are the same as those grown over many frames.
+    /// Grows the organ's vessels to completion when the command is applied: prepares the tissue and does all steps,
+    /// however long that takes, even if paused. The vessels are the same as those grown over many frames.
     ///
-    /// Where the mesh isn't loaded yet, they grow in the frame in which its tissue is ready.
+    /// If the mesh isn't loaded yet, they grow in the frame in which its tissue becomes ready.
     ///
     /// ```
     /// # use bevy_vessels::{plugin::{EntityCommandsExt, Vasculature}, synthesis::preset::PresetName};
@@ -55,10 +55,10 @@ fn grow_organ_now(world: &mut World, organ: Entity) -> Result<(), RegisteredSyst
     Ok(())
 }
 
-/// Prepares an organ here and now, and does all its steps.
+/// Prepares an organ synchronously, and does all its steps.
 fn finish_organ(In(entity): In<Entity>, assets: OrganAssets, mut organs: Query<Organ>, mut messages: StartMessages) {
     let Ok(mut organ) = organs.get_mut(entity) else {
-        warn!("{entity}: grow_now is for entities with a Vasculature");
+        warn!("{entity}: grow_now needs an entity with a Vasculature");
         return;
     };
     organ.follow();

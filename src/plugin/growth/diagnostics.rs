@@ -1,4 +1,4 @@
-//! Diagnostics of the growth, for logs and overlays.
+//! Growth diagnostics, for logs and overlays.
 
 use crate::plugin::growth::{budget::GrowthFrame, progress::GrowthProgress};
 use crate::synthesis::tree::ByKind;
@@ -12,7 +12,7 @@ use bevy::{
 pub const STEPS: DiagnosticPath = DiagnosticPath::const_new("vessels/steps");
 /// Milliseconds that these steps took.
 pub const STEP_TIME: DiagnosticPath = DiagnosticPath::const_new("vessels/step_time");
-/// Milliseconds of all that growth did in a frame: what the [`GrowthBudget`](crate::plugin::GrowthBudget) is for.
+/// Milliseconds of all growth work in a frame, which the [`GrowthBudget`](crate::plugin::GrowthBudget) limits.
 pub const GROWTH_TIME: DiagnosticPath = DiagnosticPath::const_new("vessels/growth_time");
 /// Nodes of all vessels.
 pub const NODES: DiagnosticPath = DiagnosticPath::const_new("vessels/nodes");

@@ -1,25 +1,27 @@
-//! What a growth follows: the wishes for an organ, its paint and its assets; and what a difference needs.
+//! The inputs of a growth (an organ's [`Vasculature`], paint and assets), and the work that a change of them needs.
 
-use crate::plugin::growth::vasculature::Vasculature;
-use crate::synthesis::tissue::{TissuePaint, TissueSource};
+use crate::synthesis::{
+    preset::Preset,
+    tissue::{TissuePaint, TissueSource},
+};
 use bevy::{asset::AssetId, image::Image, mesh::Mesh};
 use std::sync::Arc;
 
-/// What must be done before an organ can grow on. What stands later includes what stands before.
+/// Work to do before an organ can grow on. Each variant includes those before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Need {
     /// Nothing.
     #[default]
     Nothing,
-    /// To lay other paint over the tissue, and to grow successors there.
+    /// Lay the new paint over the tissue, and grow successors there.
     Paint,
-    /// To start the growth again, on the same tissue.
+    /// Start the growth again, on the same tissue.
     Growth,
-    /// To prepare the tissue, then to start the growth.
+    /// Prepare the tissue, then start the growth.
     Tissue,
 }
 
-/// The assets that a tissue may be made of.
+/// The assets that a tissue may be made from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SourceAssets {
     pub(crate) mesh: Option<AssetId<Mesh>>,
@@ -27,27 +29,29 @@ pub(crate) struct SourceAssets {
 }
 
 impl SourceAssets {
-    /// Those that a source needs.
+    /// The assets that a source needs.
     fn needed_by(self, source: &TissueSource) -> Self {
         Self { mesh: self.mesh.filter(|_| source.needs_mesh()), image: self.image.filter(|_| source.image().is_some()) }
     }
 }
 
-/// What a growth follows, or is about to.
+/// The inputs that a growth follows, or is about to.
 #[derive(Clone, Debug)]
 pub(crate) struct Followed {
-    pub(crate) wish: Vasculature,
+    /// The settings of the organ's [`Vasculature`](crate::plugin::Vasculature), without its seed.
+    pub(crate) settings: Preset,
+    pub(crate) seed: u64,
     pub(crate) paint: Arc<TissuePaint>,
     pub(crate) assets: SourceAssets,
 }
 
 impl Followed {
-    /// What it needs to follow something else.
-    pub(crate) fn need(&self, wish: &Vasculature, paint: &TissuePaint, assets: SourceAssets) -> Need {
-        let needed = |assets: SourceAssets| assets.needed_by(&wish.tissue);
-        if self.wish.tissue != wish.tissue || needed(self.assets) != needed(assets) {
+    /// The work needed to follow other inputs.
+    pub(crate) fn need(&self, settings: &Preset, seed: u64, paint: &TissuePaint, assets: SourceAssets) -> Need {
+        let needed = |assets: SourceAssets| assets.needed_by(&settings.tissue);
+        if self.settings.tissue != settings.tissue || needed(self.assets) != needed(assets) {
             Need::Tissue
-        } else if self.wish != *wish {
+        } else if self.settings != *settings || self.seed != seed {
             Need::Growth
         } else if *self.paint != *paint {
             Need::Paint
@@ -56,51 +60,52 @@ impl Followed {
         }
     }
 
-    /// Whether the tissue is made of this mesh asset.
+    /// Whether the tissue is made from this mesh asset.
     pub(crate) fn is_of_mesh(&self, mesh: AssetId<Mesh>) -> bool {
-        self.assets.needed_by(&self.wish.tissue).mesh == Some(mesh)
+        self.assets.needed_by(&self.settings.tissue).mesh == Some(mesh)
     }
 
-    /// Whether the tissue is made of this image asset.
+    /// Whether the tissue is made from this image asset.
     pub(crate) fn is_of_image(&self, image: AssetId<Image>) -> bool {
-        self.assets.needed_by(&self.wish.tissue).image == Some(image)
+        self.assets.needed_by(&self.settings.tissue).image == Some(image)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use crate::plugin::growth::followed::*;
-    use crate::synthesis::tissue::{TissueMode, TissueShape};
+    use crate::synthesis::{
+        preset::PresetName,
+        tissue::{TissueMode, TissueShape},
+    };
 
     const MESH: SourceAssets = SourceAssets { mesh: Some(AssetId::invalid()), image: None };
 
-    fn following(wish: &Vasculature) -> Followed {
-        Followed { wish: wish.clone(), paint: Arc::default(), assets: MESH }
+    fn following(tissue: impl Into<TissueSource>) -> Followed {
+        let settings = Preset { tissue: tissue.into(), ..PresetName::Paper.load() };
+        Followed { settings, seed: 0, paint: Arc::default(), assets: MESH }
     }
 
     #[test]
     fn only_sources_and_what_they_are_made_of_need_a_new_tissue() {
-        let (old, blank) = (Vasculature::default(), TissuePaint::default());
-        let followed = following(&old);
-        assert_eq!(followed.need(&old, &blank, MESH), Need::Nothing);
-        assert_eq!(followed.need(&old, &blank, SourceAssets::default()), Need::Tissue);
-        assert_eq!(followed.need(&old.clone().with_seed(1), &blank, MESH), Need::Growth);
-        assert_eq!(followed.need(&old.clone().with_tissue(TissueMode::Volume), &blank, MESH), Need::Tissue);
-        let unfitted = Vasculature { fit: false, ..old.clone() };
-        assert_eq!(followed.need(&unfitted, &blank, MESH), Need::Growth);
+        let (followed, blank) = (following(TissueMode::Surface), TissuePaint::default());
+        let same = followed.settings.clone();
+        assert_eq!(followed.need(&same, 0, &blank, MESH), Need::Nothing);
+        assert_eq!(followed.need(&same, 0, &blank, SourceAssets::default()), Need::Tissue);
+        assert_eq!(followed.need(&same, 1, &blank, MESH), Need::Growth);
+        assert_eq!(followed.need(&following(TissueMode::Volume).settings, 0, &blank, MESH), Need::Tissue);
+        let unfitted = Preset { fit: false, ..same.clone() };
+        assert_eq!(followed.need(&unfitted, 0, &blank, MESH), Need::Growth);
         let painted = TissuePaint { density: Some(vec![1.0]), ..blank };
-        assert_eq!(followed.need(&old, &painted, MESH), Need::Paint);
-        assert_eq!(followed.need(&old.with_seed(1), &painted, MESH), Need::Growth);
+        assert_eq!(followed.need(&same, 0, &painted, MESH), Need::Paint);
+        assert_eq!(followed.need(&same, 1, &painted, MESH), Need::Growth);
     }
 
     #[test]
     fn assets_that_a_source_does_not_need_make_no_difference() {
-        let (shape, blank) = (Vasculature::default().with_tissue(TissueShape::ball(1.0)), TissuePaint::default());
-        let followed = following(&shape);
-        assert_eq!(followed.need(&shape, &blank, SourceAssets::default()), Need::Nothing);
-        assert!(
-            !followed.is_of_mesh(AssetId::invalid())
-                && following(&Vasculature::default()).is_of_mesh(AssetId::invalid())
-        );
+        let (ball, blank) = (following(TissueShape::ball(1.0)), TissuePaint::default());
+        assert_eq!(ball.need(&ball.settings, 0, &blank, SourceAssets::default()), Need::Nothing);
+        assert!(!ball.is_of_mesh(AssetId::invalid()));
+        assert!(following(TissueMode::Surface).is_of_mesh(AssetId::invalid()));
     }
 }

@@ -1,9 +1,9 @@
 //! Grow: steps of all organs, one each in turn, until the frame's budget is used up.
 //!
 //! The budget limits how many steps a frame does, never what a step does: the same seed gives the same vessels at any
-//! frame rate. A step can't be divided, so what the next one will cost is foretold from the organ's last ones, publishing
-//! included, and it is left to the next frame where it would overrun. The organ whose step was left is the first to have
-//! its turn then: whoever takes part does as many steps as the others, give or take one.
+//! frame rate. A step can't be divided. The cost of the next one, publishing included, is predicted from the organ's
+//! last steps, and a step that would overrun waits for the next frame. Its organ has the first turn there, so all
+//! organs do the same number of steps, give or take one.
 
 use crate::plugin::announcer::Announcer;
 use crate::plugin::growth::budget::{GrowthBudget, GrowthFrame, begin_after, share_out};
@@ -59,7 +59,7 @@ pub(crate) fn grow(
     frame.step_time += start.elapsed();
 }
 
-/// Publish: says which growths have done all their steps, once their vessels are published.
+/// Publish: announces the growths that have done all their steps, once their vessels are published.
 pub(crate) fn end_growths(
     mut organs: Query<(Entity, &GrowthState, &mut GrowthProgress)>,
     mut finished: Announcer<GrowthFinished>,
@@ -83,7 +83,7 @@ fn step(state: &mut GrowthState, progress: &mut GrowthProgress) {
     *progress = GrowthProgress::of(phase, state.active(), grow_time);
 }
 
-/// Brings an organ's radii up to date with its steps. A successor that has come as far takes the place of what is drawn.
+/// Brings an organ's radii up to date with its steps. A successor that has caught up replaces the drawn vessels.
 fn settle(state: &mut GrowthState, progress: &mut GrowthProgress) {
     let start = Instant::now();
     state.settle();
@@ -95,7 +95,7 @@ fn settle(state: &mut GrowthState, progress: &mut GrowthProgress) {
     }
 }
 
-/// Does the steps again that an organ had done when it was saved, and says how many they were.
+/// Repeats the steps that an organ had done when it was saved, and returns their number.
 fn catch_up(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
     let start = Instant::now();
     let before = progress.step;
@@ -104,10 +104,10 @@ fn catch_up(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
     progress.step - before
 }
 
-/// Does all remaining steps of an organ that has its tissue, and says how many they were.
+/// Does all remaining steps of an organ that has its tissue, and returns their number.
 pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
     if !state.is_growing() {
-        // Without a tissue the wish stays; at the end there is nothing left to wish for.
+        // Without a tissue the request stays; at the end it is fulfilled.
         state.finish &= !state.is_done();
         return 0;
     }

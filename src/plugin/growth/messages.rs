@@ -1,4 +1,4 @@
-//! What is said to a growth, and what it answers.
+//! Commands to a growth, and the messages that it sends.
 
 use crate::plugin::{
     job::JobPanic,
@@ -15,7 +15,7 @@ use bevy::{
     reflect::Reflect,
 };
 
-/// Tells an organ's growth what to do. Obeyed in the same frame or the next; unknown organs are passed over.
+/// Tells an organ's growth what to do. Carried out in the same frame or the next; unknown organs are ignored.
 ///
 /// ```
 /// # use bevy_vessels::plugin::{GrowthAction, GrowthCommand, Vasculature};
@@ -30,7 +30,7 @@ use bevy::{
 pub struct GrowthCommand {
     /// The entity with the [`Vasculature`](crate::plugin::Vasculature).
     pub organ: Entity,
-    /// What it is to do.
+    /// What the growth is to do.
     pub action: GrowthAction,
 }
 
@@ -41,20 +41,20 @@ impl GrowthCommand {
     }
 }
 
-/// What a growth can be told to do.
+/// Actions of a growth command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Clone, PartialEq)]
 pub enum GrowthAction {
-    /// Do no more steps by itself.
+    /// Do no more steps until resumed or told to.
     Pause,
-    /// Go on by itself.
+    /// Continue growing.
     Resume,
-    /// Pause, but do this many steps more than have been asked for, as the budget allows.
+    /// Pause, but first do this many steps, added to those already asked for, as the budget allows.
     Step(u32),
-    /// Start again from the roots. A growth that failed tries once more. A paused one starts and stays paused.
+    /// Start again from the roots. A failed growth tries again. A paused one starts over and stays paused.
     Restart,
-    /// Do all remaining steps at once, in one frame, however long it takes, paused or not. If the mesh or the tissue
-    /// isn't ready, that is the first frame in which they are.
+    /// Do all remaining steps in one frame, however long it takes, even if paused. If the mesh or the tissue isn't
+    /// ready, this happens in the first frame in which both are.
     Finish,
 }
 
@@ -90,8 +90,8 @@ pub struct GrowthFinished {
     pub organ: Entity,
 }
 
-/// An organ's growth could not start. Other organs are not affected; a change of what was wrong starts it. Also an event
-/// on the organ, for observers.
+/// An organ's growth could not start. Other organs are not affected. Changing the faulty input starts it again. Also an
+/// event on the organ, for observers.
 #[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Message, Event, Clone, PartialEq)]
 pub struct GrowthFailed {
@@ -106,13 +106,13 @@ pub struct GrowthFailed {
 #[derive(Clone, Debug, PartialEq, thiserror::Error, Reflect)]
 #[reflect(opaque, Clone, Debug, PartialEq)]
 pub enum OrganGrowthError {
-    /// Its mesh is not one that vessels can grow on.
+    /// Vessels cannot grow on its mesh.
     #[error(transparent)]
     Mesh(#[from] OrganMeshError),
-    /// Its image is not one that a tissue can be read from.
+    /// No tissue can be read from its image.
     #[error(transparent)]
     Image(#[from] OrganImageError),
-    /// It gives no tissue of the kind that is asked for, or not with what is painted on it.
+    /// The organ gives no tissue of the requested kind, or not with the paint on it.
     #[error(transparent)]
     Tissue(#[from] TissueError),
     /// Its preset could not be loaded.
@@ -121,7 +121,7 @@ pub enum OrganGrowthError {
         /// What is wrong, with the file.
         reason: String,
     },
-    /// Its settings or roots are no start for a growth.
+    /// Its settings or roots are not valid.
     #[error(transparent)]
     Generator(#[from] GeneratorError),
     /// The work on its tissue panicked.

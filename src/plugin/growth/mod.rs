@@ -43,7 +43,7 @@ pub use vasculature::Vasculature;
 /// Grows vessels on every entity with a [`Vasculature`]. Needs no window and no renderer, only mesh assets:
 /// `DefaultPlugins`, or `AssetPlugin` and `MeshPlugin`.
 ///
-/// [`VesselPlugin`](crate::VesselPlugin) adds this, and all else that can be done with vessels.
+/// [`VesselPlugin`](crate::VesselPlugin) adds this and all other vessel plugins.
 #[derive(Clone, Debug)]
 pub struct GrowthPlugin {
     schedule: Interned<dyn ScheduleLabel>,
@@ -58,7 +58,7 @@ impl GrowthPlugin {
         self
     }
 
-    /// Starts with another budget than [`GrowthBudget::default`]. It is a resource, and may be changed later.
+    /// Starts with a budget other than [`GrowthBudget::default`]. The budget is a resource, and may be changed later.
     #[must_use]
     pub fn with_budget(mut self, budget: GrowthBudget) -> Self {
         self.budget = budget;

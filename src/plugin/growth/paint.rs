@@ -1,4 +1,4 @@
-//! What is painted on an organ, as a component.
+//! The paint on an organ, as a component.
 
 use crate::synthesis::tissue::TissuePaint;
 use bevy::{
@@ -7,17 +7,17 @@ use bevy::{
     reflect::{Reflect, std_traits::ReflectDefault},
 };
 
-/// What is painted on an organ: where more vessels grow and where fewer, where none may be, and lines along which large ones
-/// are led. Put it beside the organ's [`Vasculature`](crate::plugin::Vasculature).
+/// The paint on an organ: where more or fewer vessels grow, where none may be, and guide lines for large ones. Put it
+/// beside the organ's [`Vasculature`](crate::plugin::Vasculature).
 ///
-/// A stroke of a brush is a change of this component. It prepares nothing again that was made of the organ's mesh: the paint
-/// is laid over the tissue at hand, and vessels grow there unseen. Those that are drawn stay, and can be cut, until their
-/// successors have done as many steps; then all of them are replaced at once, and wounds with them. A stroke meanwhile
-/// starts the successors again. [`GrowthProgress`](crate::plugin::GrowthProgress) is in
-/// [`GrowthPhase::Regrowing`](crate::plugin::GrowthPhase::Regrowing) for as long.
+/// A brush stroke is a change of this component. The tissue made from the organ's mesh is not prepared again: the paint
+/// is laid over it, and new vessels grow there unseen. The drawn vessels stay, and can be cut, until their successors
+/// have done as many steps; then all are replaced at once, and their wounds are dropped. Another stroke in between
+/// starts the successors again. Until then [`GrowthProgress`](crate::plugin::GrowthProgress) is in
+/// [`GrowthPhase::Regrowing`](crate::plugin::GrowthPhase::Regrowing).
 ///
-/// Paint that cannot be laid, such as a density of too few values, ends in
-/// [`GrowthPhase::Failed`](crate::plugin::GrowthPhase::Failed). The vessels stay; taking the stroke back is enough.
+/// Invalid paint, such as a density with too few values, ends in
+/// [`GrowthPhase::Failed`](crate::plugin::GrowthPhase::Failed). The vessels stay, and taking the stroke back is enough.
 ///
 /// ```
 /// # use bevy::math::Vec3;

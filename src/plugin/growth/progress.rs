@@ -1,4 +1,4 @@
-//! How far the growth of an organ is, and whether it goes on by itself.
+//! The progress of an organ's growth, and whether it runs or is paused.
 
 use crate::synthesis::{growth::Growth, tree::ByKind};
 use bevy::{
@@ -7,7 +7,7 @@ use bevy::{
 };
 use std::time::Duration;
 
-/// What the growth of an organ is at.
+/// The phase of an organ's growth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum GrowthPhase {
@@ -16,35 +16,38 @@ pub enum GrowthPhase {
     WaitingForMesh,
     /// The image that the tissue is read from is still being loaded.
     WaitingForImage,
-    /// The mesh, or whatever the tissue is made of, is made into a tissue: for large organs beside the frames, as [`JobSettings`](crate::plugin::JobSettings) say.
+    /// The tissue is being made from the mesh or another source. Large organs do this in a job, as
+    /// [`JobSettings`](crate::plugin::JobSettings) say.
     PreparingTissue,
-    /// Steps are done, as the [budget](crate::plugin::GrowthBudget) allows. A paused growth is in this phase, too.
+    /// Steps are being done, as the [budget](crate::plugin::GrowthBudget) allows. A paused growth is in this phase,
+    /// too.
     Growing,
-    /// The organ's [paint](crate::plugin::OrganPaint) has changed: other vessels grow unseen on what is painted now. Those
-    /// that are drawn stay until these have done as many steps. What is told of steps and nodes is told of these.
+    /// The organ's [paint](crate::plugin::OrganPaint) has changed, and new vessels grow unseen on the new paint. The
+    /// drawn vessels stay until the new ones have done as many steps. Numbers of steps and nodes are those of the new
+    /// vessels.
     Regrowing,
     /// All steps are done.
     Finished,
     /// Something is wrong with the mesh, the image, the settings or the paint:
-    /// [`GrowthState::error`](crate::plugin::GrowthState::error) says what. Changing the culprit starts the growth again.
+    /// [`GrowthState::error`](crate::plugin::GrowthState::error) says what. Changing it starts the growth again.
     Failed,
 }
 
-/// How far the growth of an organ is. For reading: the plugin writes it.
+/// The progress of an organ's growth. Read-only: the plugin writes it.
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct GrowthProgress {
-    /// What is going on.
+    /// The phase of the growth.
     pub phase: GrowthPhase,
     /// Share of the tissue's preparation that is done, from 0 to 1.
     pub prepared: f32,
     /// Steps done.
     pub step: u32,
-    /// Steps that there are.
+    /// Steps in total.
     pub steps: u32,
     /// Nodes grown so far, of each kind.
     pub nodes: ByKind<usize>,
-    /// Attraction points, or other places, that still wait for a vessel of each kind.
+    /// Attraction points, or other places, that still need a vessel of each kind.
     pub waiting: ByKind<usize>,
     /// Time spent in the steps alone, on this machine.
     pub grow_time: Duration,
@@ -77,7 +80,7 @@ impl GrowthProgress {
     }
 }
 
-/// Whether an organ's growth goes on by itself. Set it at will, or send a
+/// Whether an organ's growth runs or is paused. Set it at any time, or send a
 /// [`GrowthCommand`](crate::plugin::GrowthCommand).
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Component, Default, Clone, PartialEq)]
@@ -85,13 +88,13 @@ pub enum GrowthControl {
     /// Steps follow one another as the budget allows.
     #[default]
     Running,
-    /// No step is done but those that are asked for, of vessels that grow unseen neither. The tissue is prepared all the
-    /// same.
+    /// Only steps that are asked for are done. This holds for vessels that grow unseen, too. The tissue is still
+    /// prepared.
     Paused,
 }
 
 impl GrowthControl {
-    /// Pauses what runs, and lets run what is paused.
+    /// Pauses a running growth, or resumes a paused one.
     pub fn toggle(&mut self) {
         *self = match self {
             Self::Running => Self::Paused,

@@ -1,13 +1,13 @@
-//! Publish: what the growths changed becomes visible to the rest of the app, on the vessel entities.
+//! Publish: writes the changes of growths to the vessel entities, where the rest of the app sees them.
 //!
-//! Only new and changed nodes are touched. A restart keeps the entities, so whatever else is on them stays.
+//! Only new and changed nodes are touched. A restart keeps the entities with all their other components.
 
 use crate::plugin::{
     growth::{budget::GrowthFrame, progress::GrowthProgress, state::GrowthState, vasculature::Vasculature},
+    lineage::Lineage,
     vessels::{
         appearance::VesselAppearance,
         change_log::ChangeLog,
-        lineage::Lineage,
         relations::{OrganVessels, VesselsOf},
         tree::Vessels,
     },
@@ -29,7 +29,7 @@ use bevy::{
     platform::time::Instant,
 };
 
-/// The vessels of one system of an organ, to be written.
+/// The vessels of one kind of an organ, to be written.
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(crate) struct PublishedVessels {
@@ -70,15 +70,15 @@ pub(crate) fn publish_vessels(
     }
 }
 
-/// An organ that is to have no vessels any more loses them.
+/// Removes the vessels of an organ that lost its [`Vasculature`].
 pub(crate) fn remove_vessels(removed: On<Remove, Vasculature>, mut commands: Commands) {
-    // Silenced, since the organ itself may have been despawned; the vessels follow it by their relationship then.
+    // Silenced, since the organ itself may have been despawned; the relationship despawns the vessels then.
     commands.entity(removed.entity).queue_silenced(|mut organ: EntityWorldMut| {
         organ.despawn_related::<OrganVessels>().remove::<(GrowthState, GrowthProgress)>();
     });
 }
 
-/// What happens to the vessel entity of a kind.
+/// The change to the vessel entity of a kind.
 enum News<'a> {
     None,
     Update(Entity),
@@ -86,7 +86,7 @@ enum News<'a> {
     Spawn(GrownTree<'a>),
 }
 
-/// An entity stays while there may be vessels for it: until a growth has no roots of its kind.
+/// An entity stays while it may have vessels: until a growth has no roots of its kind.
 fn news(state: &GrowthState, kind: VesselKind, entity: Option<Entity>) -> News<'_> {
     let rooted = state.growth().map(|growth| growth.trees()[kind].filter(|grown| !grown.tree.is_empty()));
     match (rooted, entity) {
@@ -121,7 +121,7 @@ fn spawn_vessels(
     let visibility = look.visibility(kind);
     let name = Name::new(kind.plural());
     let aabb = vessels.aabb();
-    // The organ may be gone, or have got these vessels by `grow_now`, by the time that this is applied.
+    // By the time this is applied, the organ may be gone, or `grow_now` may have given it these vessels.
     commands.entity(organ).queue_silenced(move |mut organ: EntityWorldMut| {
         let id = organ.id();
         organ.world_scope(|world| {

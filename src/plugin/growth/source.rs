@@ -1,8 +1,9 @@
-//! Source: from an organ's mesh, or whatever its tissue is made of, and wishes to a growth that can step.
+//! Source: from an organ's [`Vasculature`] and its mesh, or another source of tissue, to a growth that can step.
 //!
-//! Each frame: commands are obeyed, then wishes, paint and assets are compared with what the growth follows, then what the
-//! difference needs is done. A new tissue is prepared in a job, other paint is laid over it in another, a growth on the same
-//! tissue starts at once and uses its buffers again. Where many growths start at once, the budget spreads them over frames.
+//! Each frame, commands are carried out; then the vasculature, paint and assets are compared with what the growth
+//! follows; then the work that a difference needs is done. A job prepares a new tissue, and another one lays new paint
+//! over it. A growth on the same tissue starts at once and reuses its buffers. If many growths start together, the
+//! budget spreads them over frames.
 
 use crate::plugin::{
     announcer::Announcer,
@@ -21,6 +22,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     pace::{Pace, at_once},
+    preset::Preset,
     tissue::TissuePaint,
 };
 use bevy::{
@@ -39,7 +41,7 @@ use bevy::{
 };
 use std::time::Duration;
 
-/// An organ, with all that its source touches.
+/// An organ, with all that these systems touch.
 #[derive(QueryData)]
 #[query_data(mutable)]
 pub(crate) struct Organ {
@@ -53,14 +55,14 @@ pub(crate) struct Organ {
     rest: Option<&'static RestMesh>,
 }
 
-/// Where a growth reports how it starts.
+/// The messages of a growth that starts, or fails to.
 #[derive(SystemParam)]
 pub(crate) struct StartMessages<'w, 's> {
     started: Announcer<'w, 's, GrowthStarted>,
     failed: Announcer<'w, 's, GrowthFailed>,
 }
 
-/// Does what the commands of this frame say.
+/// Carries out the commands of this frame.
 pub(crate) fn obey_commands(
     mut commands: MessageReader<GrowthCommand>,
     mut organs: Query<(&mut GrowthControl, &mut GrowthState)>,
@@ -73,9 +75,9 @@ pub(crate) fn obey_commands(
     }
 }
 
-/// Compares wishes, paint and assets with what each growth follows.
+/// Compares the vasculature, paint and assets with what each growth follows.
 ///
-/// A mesh that vessels follow may have other positions than before: that is no change.
+/// New vertex positions are no change if the vessels follow the mesh.
 pub(crate) fn notice_changes(
     mut mesh_events: MessageReader<AssetEvent<Mesh>>,
     mut image_events: MessageReader<AssetEvent<Image>>,
@@ -98,7 +100,7 @@ pub(crate) fn notice_changes(
     }
 }
 
-/// Begins what is needed: to prepare a tissue, to paint it, or a growth on the tissue at hand.
+/// Begins the work that is needed: preparing a tissue, painting it, or a growth on the current tissue.
 pub(crate) fn begin(
     assets: OrganAssets,
     mut organs: Query<Organ>,
@@ -114,7 +116,7 @@ pub(crate) fn begin(
     });
 }
 
-/// Starts the growth of organs whose tissue has become ready.
+/// Starts the growth on tissues that have become ready.
 pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessages, mut account: StartAccount) {
     let ready = organs.iter().filter(|organ| organ.state.is_tissue_ready()).map(|organ| organ.entity);
     account.start_in_turn(ready.collect(), |organ| {
@@ -126,7 +128,7 @@ pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessa
     });
 }
 
-/// Shows how far the preparations of tissues are.
+/// Writes the progress of tissue preparations.
 pub(crate) fn show_preparations(mut organs: Query<(&GrowthState, &mut GrowthProgress)>) {
     for (state, mut progress) in &mut organs {
         if let Some(prepared) = state.preparation_progress().filter(|&prepared| prepared != progress.prepared) {
@@ -135,7 +137,7 @@ pub(crate) fn show_preparations(mut organs: Query<(&GrowthState, &mut GrowthProg
     }
 }
 
-/// What starts cost, and who had a turn last.
+/// The cost of starts, and the organ that had the last turn.
 #[derive(SystemParam)]
 pub(crate) struct StartAccount<'w, 's> {
     budget: Res<'w, GrowthBudget>,
@@ -145,7 +147,7 @@ pub(crate) struct StartAccount<'w, 's> {
 }
 
 impl StartAccount<'_, '_> {
-    /// Starts organs in turn as long as the budget allows; one at least.
+    /// Starts organs in turn while the budget allows, and at least one.
     fn start_in_turn(&mut self, organs: Vec<Entity>, mut start: impl FnMut(Entity)) {
         let mut round: Vec<_> = organs.into_iter().map(|organ| (organ, ())).collect();
         round.sort_unstable();
@@ -178,7 +180,7 @@ fn news<A: Asset>(event: &AssetEvent<A>) -> Option<(AssetId<A>, bool)> {
 type Started = bool;
 
 impl OrganItem<'_, '_> {
-    /// Takes note of changed wishes.
+    /// Compares the organ with what its growth follows.
     pub(crate) fn follow(&mut self) {
         let assets = SourceAssets { mesh: self.mesh.map(|mesh| mesh.id()), image: self.image.map(|image| image.id()) };
         self.state.bypass_change_detection().resume(self.progress.step);
@@ -189,11 +191,11 @@ impl OrganItem<'_, '_> {
         if self.wish.is_changed() || is_painted || self.state.follows_other_assets(assets) {
             let blank = TissuePaint::default();
             let paint = self.paint.as_ref().map_or(&blank, |paint| &paint.0);
-            self.state.follow(&self.wish, paint, assets);
+            self.state.follow(Preset::from(&*self.wish), self.wish.seed, paint, assets);
         }
     }
 
-    /// Does what is needed next. A tissue is prepared and painted in jobs; without jobs, here and now.
+    /// Does what is needed next. Jobs prepare and paint the tissue; without jobs it is done synchronously.
     pub(crate) fn begin(&mut self, assets: &OrganAssets, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         match self.state.next_need() {
             Need::Nothing => Ok(false),
@@ -202,7 +204,7 @@ impl OrganItem<'_, '_> {
         }
     }
 
-    /// Prepares the tissue, and paints it.
+    /// Prepares and paints the tissue.
     fn prepare(&mut self, assets: &OrganAssets, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         self.state.drop_tissue();
         let copy = match assets.copy(&self.wish.tissue, self.mesh, self.image)? {
@@ -215,8 +217,8 @@ impl OrganItem<'_, '_> {
         self.run(copy.work(&source).saturating_add(paint.work()), jobs, |pace| copy.prepare(source, paint, pace))
     }
 
-    /// Grows on the tissue at hand, which is painted first where it isn't yet as it is to be. After a stroke, vessels grow
-    /// beside those that are drawn.
+    /// Grows on the current tissue, after painting it if its paint is outdated. After a stroke, vessels grow beside the
+    /// drawn ones.
     fn grow_on_tissue_at_hand(&mut self, need: Need, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         self.state.choose_place(need);
         if self.state.takes_back() {
@@ -232,7 +234,7 @@ impl OrganItem<'_, '_> {
         self.run(tissue.work(&paint), jobs, |pace| tissue.repainted(paint, pace))
     }
 
-    /// Has a tissue made in a job, and is not waited for; without jobs, starts the growth on it.
+    /// Makes a tissue in a job, without waiting for it. Without jobs, makes it now and starts the growth on it.
     fn run<W>(
         &mut self,
         items: usize,
@@ -249,7 +251,7 @@ impl OrganItem<'_, '_> {
 
     /// Starts the growth on a tissue.
     pub(crate) fn start(&mut self, tissue: PaintedTissue) -> Result<Started, OrganGrowthError> {
-        for warning in self.state.start(tissue, &self.wish)? {
+        for warning in self.state.start(tissue, Preset::from(&*self.wish), self.wish.seed)? {
             warn!("{}: {warning}", self.entity);
         }
         let phase = if self.state.successor().is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing };
@@ -257,7 +259,7 @@ impl OrganItem<'_, '_> {
         Ok(true)
     }
 
-    /// Says that the growth has started, or why it hasn't.
+    /// Reports that the growth has started, or why it hasn't.
     pub(crate) fn report(&mut self, outcome: Result<Started, OrganGrowthError>, messages: &mut StartMessages) {
         let organ = self.entity;
         match outcome {

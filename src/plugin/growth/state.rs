@@ -1,79 +1,79 @@
-//! What the plugin keeps about an organ while it grows: the tissue, the growth, and what is still to be done.
+//! The plugin's state of a growing organ: the tissue, the growth, and the work still to do.
 //!
-//! What a growth follows is in [`followed`](super::followed), its steps and what they changed in [`steps`](super::steps).
+//! The inputs of a growth are in [`followed`](super::followed), its steps and their changes in [`steps`](super::steps).
 
 use crate::plugin::{
     growth::{
+        budget::Costs,
         followed::{Followed, Need, SourceAssets},
         messages::{GrowthAction, OrganGrowthError},
         progress::{GrowthControl, GrowthPhase},
-        steps::Costs,
         successor::Successor,
         tissue::{Painted, PaintedTissue},
-        vasculature::Vasculature,
     },
     job::Job,
+    lineage::Lineage,
     organ::{image::OrganImageError, mesh::OrganMeshError},
-    vessels::lineage::Lineage,
 };
 use crate::synthesis::{
     growth::{Growth, GrowthWarning},
     mesh::TriangleMesh,
+    preset::Preset,
     tissue::{Tissue, TissuePaint},
     tree::ByKind,
 };
 use bevy::{asset::AssetId, ecs::component::Component, image::Image, mesh::Mesh};
 use std::sync::Arc;
 
-/// The growth of an organ under way. For reading: the plugin drives it.
+/// The growth of an organ. Read-only: the plugin drives it.
 #[derive(Component, Debug, Default)]
 pub struct GrowthState {
     /// What must be done next.
     pub(crate) need: Need,
-    /// What the growth follows, or is about to.
+    /// The inputs that the growth follows, or is about to.
     followed: Option<Followed>,
-    /// A tissue being prepared or painted. To let go of the job stops it, so that no outdated tissue ever arrives.
+    /// A tissue being prepared or painted. Dropping the job stops it, so no outdated tissue ever arrives.
     preparation: Option<Job<Painted>>,
-    /// Whether what is about to start grows beside vessels that stay until then.
+    /// Whether the next growth to start grows unseen, beside vessels that stay meanwhile.
     beside: bool,
     pub(super) tissue: Option<PaintedTissue>,
-    /// Which tissue it is, or will be when it is ready, whatever is painted on it.
+    /// Lineage of the current or coming tissue. Paint does not change it.
     tissue_lineage: Lineage,
     pub(super) growth: Option<Box<dyn Growth>>,
-    /// What will take the place of the growth.
+    /// The growth that will replace this one.
     pub(super) successor: Option<Successor>,
-    /// Which trees are those of the growth.
+    /// Lineages of the growth's trees.
     pub(super) lineages: ByKind<Lineage>,
     error: Option<OrganGrowthError>,
-    /// Warnings that have been given for the settings.
+    /// Warnings already given about the settings.
     warned: Vec<GrowthWarning>,
-    /// Steps that the growth had done when its organ was saved, and does again at once.
+    /// Steps that the growth had done when its organ was saved, and repeats at once.
     pub(super) arrears: u32,
     /// Steps that a paused growth may still do.
     pub(super) granted: u32,
-    /// Whether all remaining steps are to be done at once.
+    /// Whether to do all remaining steps at once.
     pub(crate) finish: bool,
-    /// Whether steps were done whose radii are not known yet.
+    /// Whether steps were done whose radii are not settled yet.
     pub(super) unsettled: bool,
     /// Nodes whose radius changed since the vessels were last published.
     pub(super) changed: ByKind<Vec<u32>>,
-    /// Which vessels are to be published anew, from the first node on.
+    /// Kinds whose vessels must be published again, from the first node on.
     pub(super) rebuild: ByKind<bool>,
     pub(super) costs: Costs,
 }
 
 impl GrowthState {
-    /// The growth: its trees are the centre lines on the tissue. `None` until the tissue is ready, and after an error.
+    /// The growth, whose trees are centre lines on the tissue. `None` until the tissue is ready, and after an error.
     pub fn growth(&self) -> Option<&dyn Growth> {
         self.growth.as_deref()
     }
 
-    /// What grows unseen on a tissue that was painted anew, and will take the place of the [`growth`](Self::growth).
+    /// The growth that grows unseen on a repainted tissue, and will replace the [`growth`](Self::growth).
     pub fn successor(&self) -> Option<&dyn Growth> {
         self.successor.as_ref().map(|successor| &*successor.growth)
     }
 
-    /// The tissue that is supplied, with what is painted on it. `None` until it is ready.
+    /// The tissue that is supplied, with its paint. `None` until it is ready.
     pub fn tissue(&self) -> Option<&dyn Tissue> {
         self.tissue.as_ref().map(|painted| &*painted.tissue)
     }
@@ -89,7 +89,7 @@ impl GrowthState {
         self.error.as_ref()
     }
 
-    /// Does what a command says, and gives whether the growth goes on by itself from now on.
+    /// Carries out a command, and returns whether the growth runs from now on.
     pub(crate) fn obey(&mut self, action: GrowthAction, control: GrowthControl) -> GrowthControl {
         match action {
             GrowthAction::Pause => {
@@ -112,17 +112,17 @@ impl GrowthState {
         control
     }
 
-    /// Compares what is wished for with what the growth follows, and demands what the difference needs.
-    pub(crate) fn follow(&mut self, wish: &Vasculature, paint: &TissuePaint, assets: SourceAssets) {
+    /// Compares the inputs with those that the growth follows, and demands the work that a difference needs.
+    pub(crate) fn follow(&mut self, settings: Preset, seed: u64, paint: &TissuePaint, assets: SourceAssets) {
         let Some(followed) = &mut self.followed else {
-            self.followed = Some(Followed { wish: wish.clone(), paint: Arc::new(paint.clone()), assets });
+            self.followed = Some(Followed { settings, seed, paint: Arc::new(paint.clone()), assets });
             self.demand(Need::Tissue);
             return;
         };
-        let need = followed.need(wish, paint, assets);
+        let need = followed.need(&settings, seed, paint, assets);
         followed.assets = assets;
-        if followed.wish != *wish {
-            followed.wish.clone_from(wish);
+        if followed.settings != settings || followed.seed != seed {
+            (followed.settings, followed.seed) = (settings, seed);
             self.arrears = 0;
         }
         if *followed.paint != *paint {
@@ -131,24 +131,24 @@ impl GrowthState {
         self.demand(need);
     }
 
-    /// Takes note of how far the growth of an organ was that comes from a scene or is a clone.
+    /// Notes how many steps an organ from a scene, or a clone, had done.
     pub(crate) fn resume(&mut self, steps: u32) {
         if self.followed.is_none() {
             self.arrears = steps;
         }
     }
 
-    /// Whether the growth follows other assets than these.
+    /// Whether the growth follows assets other than these.
     pub(crate) fn follows_other_assets(&self, assets: SourceAssets) -> bool {
         self.followed.as_ref().is_none_or(|followed| followed.assets != assets)
     }
 
-    /// What is painted on the tissue, or is about to be.
+    /// The paint on the tissue, or the paint about to be laid.
     pub(crate) fn paint(&self) -> Arc<TissuePaint> {
         self.followed.as_ref().map(|followed| Arc::clone(&followed.paint)).unwrap_or_default()
     }
 
-    /// Takes note that a mesh asset has new content (`replaced`), or has been loaded at last.
+    /// Notes that a mesh asset has new content (`replaced`), or has been loaded at last.
     pub(crate) fn notice_mesh(&mut self, mesh: AssetId<Mesh>, replaced: bool) {
         let was_missing = matches!(self.error, Some(OrganGrowthError::Mesh(OrganMeshError::NotLoaded { .. })));
         if (replaced || was_missing) && self.followed.as_ref().is_some_and(|followed| followed.is_of_mesh(mesh)) {
@@ -156,7 +156,7 @@ impl GrowthState {
         }
     }
 
-    /// Takes note that an image asset has new content (`replaced`), or has been loaded at last.
+    /// Notes that an image asset has new content (`replaced`), or has been loaded at last.
     pub(crate) fn notice_image(&mut self, image: AssetId<Image>, replaced: bool) {
         let was_missing = matches!(self.error, Some(OrganGrowthError::Image(OrganImageError::NotLoaded { .. })));
         if (replaced || was_missing) && self.followed.as_ref().is_some_and(|followed| followed.is_of_image(image)) {
@@ -168,7 +168,8 @@ impl GrowthState {
         self.need = self.need.max(need);
     }
 
-    /// Wants all steps done as soon as can be, and no preparation under way: what it prepares is needed now.
+    /// Demands that all steps are done as soon as possible. Drops a preparation under way, since its result is needed
+    /// now.
     pub(crate) fn hasten(&mut self) {
         self.finish = true;
         if self.preparation.take().is_some() {
@@ -182,7 +183,7 @@ impl GrowthState {
         }
     }
 
-    /// What there is to do now. What needs a tissue needs that first, unless it is on its way.
+    /// The work to do now. If it needs a tissue, that comes first, unless one is on its way.
     pub(crate) fn next_need(&self) -> Need {
         match self.need {
             Need::Growth | Need::Paint if self.tissue.is_none() && self.preparation.is_some() => Need::Nothing,
@@ -191,7 +192,7 @@ impl GrowthState {
         }
     }
 
-    /// Lets go of tissue and growth, and of a preparation under way, because they no longer belong to the organ.
+    /// Drops the tissue, the growth and a preparation under way, because they no longer belong to the organ.
     pub(crate) fn drop_tissue(&mut self) {
         self.preparation = None;
         self.tissue = None;
@@ -204,19 +205,19 @@ impl GrowthState {
         }
     }
 
-    /// Decides whether a growth that is about to start on other paint grows beside the vessels that are drawn. It does if
-    /// there are any.
+    /// Decides whether a growth that is about to start on other paint grows beside drawn vessels. It does if there are
+    /// any.
     pub(crate) fn choose_place(&mut self, need: Need) {
         let has_grown = |growth: &dyn Growth| growth.is_finished() || growth.progress().done > 0;
         self.beside = need == Need::Paint && self.growth().is_some_and(has_grown);
     }
 
-    /// Whether what is about to start grows beside vessels that stay until then.
+    /// Whether the next growth to start grows unseen, beside vessels that stay meanwhile.
     pub(crate) fn is_beside(&self) -> bool {
         self.beside
     }
 
-    /// Forgets about successors if the vessels that are drawn grew on what is painted now: a stroke was taken back.
+    /// Drops the successors if the drawn vessels grew on the present paint, because a stroke was taken back.
     pub(crate) fn takes_back(&mut self) -> bool {
         let is_drawn = self.tissue.as_ref().is_some_and(|tissue| *tissue.paint == *self.paint());
         let takes_back = self.beside && is_drawn;
@@ -228,32 +229,32 @@ impl GrowthState {
         takes_back
     }
 
-    /// The tissue at hand, with what is painted now where it has been painted already.
+    /// The current tissue, with the present paint if that has been laid already.
     pub(crate) fn tissue_at_hand(&self) -> Option<&PaintedTissue> {
         let paint = self.paint();
         let painted = self.successor.as_ref().map(|successor| &successor.tissue).into_iter().chain(&self.tissue);
         painted.clone().find(|tissue| *tissue.paint == *paint).or(self.tissue.as_ref())
     }
 
-    /// Waits for a tissue from now on.
+    /// Begins to wait for a tissue.
     pub(crate) fn await_tissue(&mut self, preparation: Job<Painted>) {
         self.preparation = Some(preparation);
         self.successor = None;
         self.need = Need::Nothing;
     }
 
-    /// Whether a tissue has been prepared and waits to be grown on.
+    /// Whether a tissue has been prepared and its growth has not started.
     pub(crate) fn is_tissue_ready(&self) -> bool {
         self.preparation.as_ref().is_some_and(Job::is_done)
     }
 
-    /// Share of the preparation under way that is done, if there is one.
+    /// Share of the preparation that is done, if one is under way.
     pub(crate) fn preparation_progress(&self) -> Option<f32> {
         self.preparation.as_ref().map(Job::progress)
     }
 
-    /// The result of the preparation, once it is there. `None` too where something else has been asked for meanwhile: a tissue
-    /// is kept, to be painted again, and what was wrong may be so no more.
+    /// The result of the preparation, once it is ready. `None` if something else has been asked for meanwhile: a tissue
+    /// is kept, to be painted again, and an error may no longer hold.
     pub(crate) fn poll_preparation(&mut self) -> Option<Painted> {
         match Job::poll(&mut self.preparation)?.unwrap_or_else(|panic| Err(panic.into())) {
             Ok(tissue) if *tissue.paint != *self.paint() => {
@@ -265,26 +266,27 @@ impl GrowthState {
         }
     }
 
-    /// Starts the growth on a tissue, where buffers are used again if it is the one at hand.
+    /// Starts the growth on a tissue. Buffers are reused if it is the current one.
     ///
-    /// Gives the warnings about the settings that have not been given before.
+    /// Returns the warnings about the settings that have not been given before.
     pub(crate) fn start(
         &mut self,
         painted: PaintedTissue,
-        wish: &Vasculature,
+        settings: Preset,
+        seed: u64,
     ) -> Result<Vec<GrowthWarning>, OrganGrowthError> {
         self.need = Need::Nothing;
         self.preparation = None;
         self.successor = None;
         self.error = None;
         let tissue = Arc::clone(&painted.tissue);
-        let mut generator = wish.generator.clone();
-        if wish.fit {
+        let Preset { mut generator, roots, fit, .. } = settings;
+        if fit {
             generator = generator.fit(tissue.extent());
         }
-        let roots = wish.roots.clone().into();
+        let roots = roots.into();
         let warnings = if let (true, Some(drawn)) = (self.beside, &self.growth) {
-            let growth = generator.start(tissue, &roots, wish.seed)?;
+            let growth = generator.start(tissue, &roots, seed)?;
             let warnings = growth.warnings();
             self.successor = Some(Successor::of(&**drawn, painted, growth));
             warnings
@@ -293,8 +295,8 @@ impl GrowthState {
             self.costs = Costs::default();
             self.tissue = Some(painted);
             let growth = match self.growth.take() {
-                Some(growth) => generator.restart(growth, tissue, &roots, wish.seed),
-                None => generator.start(tissue, &roots, wish.seed),
+                Some(growth) => generator.restart(growth, tissue, &roots, seed),
+                None => generator.start(tissue, &roots, seed),
             }?;
             self.growth.insert(growth).warnings()
         };
@@ -302,7 +304,7 @@ impl GrowthState {
         Ok(self.unheard(warnings))
     }
 
-    /// The trees from now on are other ones than before.
+    /// Gives the trees new lineages.
     pub(super) fn begin_trees(&mut self) {
         self.lineages = ByKind::from_fn(|_| Lineage::new_one());
         self.rebuild = ByKind::from_fn(|_| true);
@@ -314,8 +316,8 @@ impl GrowthState {
         unheard
     }
 
-    /// Ends what is under way because of an error. Vessels of an earlier growth go, too: they are not what is wished for.
-    /// Those that were to stay until their successors are there stay.
+    /// Ends the work under way because of an error. Vessels of an earlier growth are dropped, too, since they are
+    /// outdated. Vessels that wait for successors stay.
     pub(crate) fn fail(&mut self, error: OrganGrowthError) {
         self.need = Need::Nothing;
         self.preparation = None;
@@ -328,7 +330,7 @@ impl GrowthState {
         self.error = Some(error);
     }
 
-    /// What a growth that has not failed is at.
+    /// The phase of a growth that has not failed.
     pub(crate) fn phase(&self) -> GrowthPhase {
         match (self.successor(), self.growth()) {
             (Some(_), _) => GrowthPhase::Regrowing,
@@ -337,7 +339,7 @@ impl GrowthState {
         }
     }
 
-    /// Which tissue it grows on: another one after each preparation, and the same whatever is painted on it.
+    /// Lineage of the tissue that it grows on. Each preparation changes it; paint does not.
     pub(crate) fn tissue_lineage(&self) -> Lineage {
         self.tissue_lineage
     }

@@ -1,13 +1,8 @@
-//! Steps of an organ's growth, what they cost, and what they changed.
+//! Steps of an organ's growth, with their costs and changes.
 
 use crate::plugin::{
-    growth::{
-        budget::{LastCosts, StepCost},
-        progress::GrowthControl,
-        state::GrowthState,
-        successor::Successor,
-    },
-    vessels::lineage::Lineage,
+    growth::{budget::StepCost, progress::GrowthControl, state::GrowthState, successor::Successor},
+    lineage::Lineage,
 };
 use crate::synthesis::{
     growth::{GrownTree, Growth, TreeUpdate},
@@ -15,25 +10,13 @@ use crate::synthesis::{
 };
 use std::time::Duration;
 
-/// What steps have cost.
-#[derive(Debug, Default)]
-pub(crate) struct Costs {
-    steps: LastCosts,
-    /// Settling and publishing, for each step that was published.
-    publishing: LastCosts,
-    /// Settling, since the vessels were last published.
-    settling: Duration,
-    /// Steps that haven't been published.
-    unpublished: u32,
-}
-
 impl GrowthState {
-    /// Whether there are steps to be done again at once.
+    /// Whether there are steps to repeat at once.
     pub(crate) fn is_in_arrears(&self) -> bool {
         self.arrears > 0 && self.growth.is_some()
     }
 
-    /// What steps are done of: the growth, or what will take its place.
+    /// The growth that does the steps: the drawn one, or its successor.
     pub(crate) fn active(&self) -> Option<&dyn Growth> {
         self.successor().or(self.growth())
     }
@@ -47,7 +30,7 @@ impl GrowthState {
         self.error().is_none() && self.active().is_some_and(|growth| !growth.is_finished())
     }
 
-    /// Whether all steps are done, and what they came to is what is drawn.
+    /// Whether all steps are done and their result is drawn.
     pub(crate) fn is_done(&self) -> bool {
         self.error().is_none() && self.active().is_some_and(|growth| growth.is_finished()) && self.successor.is_none()
     }
@@ -58,7 +41,7 @@ impl GrowthState {
         willing && self.is_growing()
     }
 
-    /// Does one step, whose radii are to be [settled](Self::settle). Without a growth, or at its end, nothing is done.
+    /// Does one step, whose radii must be [settled](Self::settle) later. Does nothing without a growth or at its end.
     pub(crate) fn step(&mut self) {
         let Some(growth) = self.active_mut().filter(|growth| !growth.is_finished()) else { return };
         growth.advance();
@@ -71,8 +54,8 @@ impl GrowthState {
         self.unsettled
     }
 
-    /// Renews the radii after a frame's last step, and remembers what the steps changed. Many steps change the same radii,
-    /// those of the trunks: once is enough. Those of a growth that nobody sees can wait.
+    /// Computes the radii after a frame's last step, and records what the steps changed. Once is enough, since many
+    /// steps change the same radii, those of the trunks. A growth that is not drawn can wait.
     pub(crate) fn settle(&mut self) {
         self.unsettled = false;
         if self.successor.is_some() {
@@ -84,7 +67,7 @@ impl GrowthState {
         self.take_updates();
     }
 
-    /// Puts a successor that has come as far as what is drawn in the place of that.
+    /// Replaces the drawn growth by a successor that has caught up with it.
     fn succeed(&mut self) {
         let Some(Successor { tissue, mut growth, .. }) = self.successor.take_if(|successor| successor.has_caught_up())
         else {
@@ -95,7 +78,7 @@ impl GrowthState {
         self.begin_trees();
     }
 
-    /// Remembers what the last settling changed.
+    /// Records what the last settling changed.
     fn take_updates(&mut self) {
         let Some(growth) = &self.growth else { return };
         for kind in VesselKind::ALL {
@@ -110,23 +93,22 @@ impl GrowthState {
         }
     }
 
-    /// Takes note of what settling cost.
+    /// Records the cost of settling.
     pub(crate) fn note_settling(&mut self, cost: Duration) {
-        self.costs.settling += cost;
+        self.costs.note_settling(cost);
     }
 
-    /// Takes note of what a step cost.
+    /// Records the cost of a step.
     pub(crate) fn note_step(&mut self, cost: Duration) {
-        self.costs.steps.add(cost);
-        self.costs.unpublished += 1;
+        self.costs.note_step(cost);
     }
 
-    /// What the next step is expected to cost.
+    /// Expected cost of the next step.
     pub(crate) fn expected_cost(&self) -> StepCost {
-        StepCost { step: self.costs.steps.expected(), publish: self.costs.publishing.expected() }
+        self.costs.expected()
     }
 
-    /// Does the steps again that were done before the organ was saved.
+    /// Repeats the steps that were done before the organ was saved.
     pub(crate) fn catch_up(&mut self) {
         for _ in 0..std::mem::take(&mut self.arrears) {
             let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { break };
@@ -137,7 +119,7 @@ impl GrowthState {
 
     /// Does all remaining steps.
     pub(crate) fn run(&mut self) {
-        // With so many steps, taking everything anew is cheaper than to remember every change.
+        // After so many steps, publishing everything is cheaper than recording every change.
         self.rebuild = ByKind::from_fn(|_| true);
         self.finish = false;
         if let Some(growth) = self.active_mut() {
@@ -152,23 +134,20 @@ impl GrowthState {
         self.rebuild.values().any(|&rebuild| rebuild) || self.changed.values().any(|changed| !changed.is_empty())
     }
 
-    /// What is to be published of a kind: its tree and the nodes that changed, `None` for all of them.
+    /// A kind's tree and its changed nodes, `None` for all of them.
     pub(crate) fn news(&self, kind: VesselKind) -> (Option<GrownTree<'_>>, Option<&[u32]>) {
         let changed = (!self.rebuild[kind]).then_some(self.changed[kind].as_slice());
         (self.growth.as_ref().and_then(|growth| growth.trees()[kind]), changed)
     }
 
-    /// Which tree that of a kind is: another one after each start, and where the generator replaced it.
+    /// Lineage of a kind's tree: a new one after each start, and when the generator replaced the tree.
     pub(crate) fn lineage(&self, kind: VesselKind) -> Lineage {
         self.lineages[kind]
     }
 
-    /// Forgets what has been published, at this cost.
+    /// Clears the published changes, and records the cost of publishing.
     pub(crate) fn clear_news(&mut self, cost: Duration) {
-        let cost = cost + std::mem::take(&mut self.costs.settling);
-        if let Some(each) = cost.checked_div(std::mem::take(&mut self.costs.unpublished)) {
-            self.costs.publishing.add(each);
-        }
+        self.costs.note_publishing(cost);
         self.rebuild = ByKind::default();
         self.changed.values_mut().for_each(Vec::clear);
     }

@@ -20,7 +20,7 @@ use bevy::{
 };
 use std::sync::Arc;
 
-/// A tissue that has been prepared, with the paint that lies on it.
+/// A prepared tissue with its paint.
 #[derive(Clone, Debug)]
 pub(crate) struct PaintedTissue {
     base: PreparedTissue,
@@ -30,7 +30,7 @@ pub(crate) struct PaintedTissue {
     pub(crate) tissue: Arc<dyn Tissue>,
 }
 
-/// A tissue, or why there is none.
+/// A painted tissue, or the reason why there is none.
 pub(crate) type Painted = Result<PaintedTissue, OrganGrowthError>;
 
 impl PaintedTissue {
@@ -44,7 +44,7 @@ impl PaintedTissue {
         self.base.mesh()
     }
 
-    /// How much work it is to lay other paint over it, in items.
+    /// Work of laying other paint over it, in items.
     pub(crate) fn work(&self, paint: &TissuePaint) -> usize {
         self.base.painting_work(paint)
     }
@@ -55,7 +55,7 @@ impl PaintedTissue {
     }
 }
 
-/// What is copied of an organ's assets, so that copying is all that the frame has to wait for.
+/// The copied part of an organ's assets. Copying is the only work that the frame waits for.
 pub(crate) enum SourceCopy {
     Mesh(MeshCopy),
     Image(Box<Image>),
@@ -63,7 +63,7 @@ pub(crate) enum SourceCopy {
 }
 
 impl SourceCopy {
-    /// How much work it is to make a source's tissue of it, in items.
+    /// Work of making a source's tissue from it, in items.
     pub(crate) fn work(&self, source: &TissueSource) -> usize {
         source.work(match self {
             Self::Mesh(mesh) => mesh.triangles.len(),
@@ -72,7 +72,7 @@ impl SourceCopy {
         })
     }
 
-    /// The slow part of the preparation: a function of what was copied, and nothing else.
+    /// The slow part of the preparation. It depends on the copy and the arguments alone.
     pub(crate) async fn prepare(self, source: TissueSource, paint: Arc<TissuePaint>, pace: Pace) -> Painted {
         let mut data = SourceData::default();
         let read = match (self, source.image()) {
@@ -100,9 +100,9 @@ pub(crate) struct OrganAssets<'w> {
     server: Option<Res<'w, AssetServer>>,
 }
 
-/// What came of looking for an asset that a tissue is made of.
+/// Result of looking up an asset that a tissue is made from.
 pub(crate) enum Copied {
-    /// Here it is.
+    /// A copy.
     Source(SourceCopy),
     /// There is no mesh yet, or it is being loaded.
     NoMeshYet,
@@ -111,7 +111,7 @@ pub(crate) enum Copied {
 }
 
 impl OrganAssets<'_> {
-    /// A copy of what a source needs of an organ.
+    /// Copies the data that a source needs of an organ.
     pub(crate) fn copy(
         &self,
         source: &TissueSource,
@@ -148,7 +148,7 @@ impl OrganAssets<'_> {
         }
     }
 
-    /// Why an asset that isn't there will not come.
+    /// Fails if an asset that isn't there will never be loaded.
     fn expect<A: Asset>(&self, handle: &Handle<A>) -> Result<(), String> {
         match self.server.as_ref().map(|server| server.load_state(handle.id())) {
             Some(LoadState::Failed(error)) => Err(error.to_string()),

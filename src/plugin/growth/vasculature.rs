@@ -1,7 +1,7 @@
-//! What a user wishes for: vessels on an organ.
+//! The vessels that a user asks for on an organ.
 //!
-//! An organ is an entity with a mesh and a [`Vasculature`]. Everything else is added by the plugin. Each kind of vessels that
-//! has roots gets one vessel entity, a child of the organ, that carries a whole tree in
+//! An organ is an entity with a mesh and a [`Vasculature`]. The plugin adds everything else. Each kind of vessels that
+//! has roots gets one vessel entity, a child of the organ, which carries the whole tree in
 //! [`Vessels`](crate::plugin::Vessels).
 
 use crate::plugin::{
@@ -24,12 +24,12 @@ use bevy::{
     transform::components::Transform,
 };
 
-/// Vessels that an organ is to have: put it beside the organ's `Mesh3d`, and they grow.
+/// The vessels to grow on an organ. Put it beside the organ's `Mesh3d`.
 ///
-/// Changing any field of it starts the growth again at the next frame. What is slow, preparing the tissue, is done again
-/// only where [`tissue`](Self::tissue) or the mesh changed. Removing it removes the vessels.
+/// Changing any field starts the growth again at the next frame. The slow part, preparing the tissue, is repeated only
+/// if [`tissue`](Self::tissue) or the mesh changed. Removing the component removes the vessels.
 ///
-/// All lengths are in the local space of the mesh, with [`fit`](Self::fit) off; with `fit` on, they are shares of the
+/// With [`fit`](Self::fit) off, all lengths are in the local space of the mesh. With `fit` on, they are shares of the
 /// organ's size.
 ///
 /// ```
@@ -41,21 +41,22 @@ use bevy::{
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(GrowthState, GrowthProgress, GrowthControl, VesselAppearance, Transform, Visibility)]
 pub struct Vasculature {
-    /// Chooses one of the countless networks that the same settings give. The same seed gives the same network, on any
+    /// Chooses one of the many networks that the same settings can give. The same seed gives the same network, on any
     /// machine and at any frame rate.
     ///
     /// Default: 0.
     pub seed: u64,
-    /// What makes the vessels, with its settings. Default: that of [`PresetName::Paper`].
+    /// The generator of the vessels, with its settings. Default: that of [`PresetName::Paper`].
     pub generator: Generator,
     /// Where vessels enter the organ, in the local space of its mesh.
     pub roots: RootPlacements,
-    /// What is to be supplied: the surface of the organ's mesh, its inside or both; a plain shape; or what an image shows.
+    /// The tissue to supply: the surface of the organ's mesh, its inside or both; a plain shape; or what an image
+    /// shows.
     pub tissue: TissueSource,
-    /// Whether the lengths of the [`generator`](Self::generator) are made for a tissue of equivalent diameter 1, as those of
-    /// all presets are, and are to be fitted to this organ ([`Generator::fit`]).
+    /// Whether to fit the lengths of the [`generator`](Self::generator) to this organ ([`Generator::fit`]). They must
+    /// be made for a tissue of equivalent diameter 1, as those of all presets are.
     ///
-    /// Off, they are taken as lengths in the mesh's local space. Default: true.
+    /// If off, they are lengths in the mesh's local space. Default: true.
     pub fit: bool,
 }
 
@@ -78,7 +79,7 @@ impl Vasculature {
         self
     }
 
-    /// Grows by another generator or other settings, with the same tissue and roots.
+    /// Uses another generator or other settings, with the same tissue and roots.
     #[must_use]
     pub fn with_generator(mut self, generator: impl Into<Generator>) -> Self {
         self.generator = generator.into();
@@ -100,7 +101,7 @@ impl Vasculature {
     }
 }
 
-/// The preset that makes these vessels, whatever the seed: for a file.
+/// The preset of these vessels, without the seed: for a file.
 impl From<&Vasculature> for Preset {
     fn from(vasculature: &Vasculature) -> Self {
         let Vasculature { seed: _, generator, roots, tissue, fit } = vasculature.clone();

@@ -1,9 +1,9 @@
-//! Work that may take longer than a frame: done at once where it is little, beside the frames where there is a second
-//! thread, and a slice in each frame where there is none.
+//! Work that may take longer than a frame: done at once if it is small, in the task pool if there is a second thread,
+//! and a slice in each frame if there is none.
 //!
-//! In: [paced](crate::synthesis::pace) work, and how many items it goes through. Out: its result, in the same frame or a
-//! later one. Where the work is done never changes what comes out. Who lets go of a [`Job`] stops it. Work that panics
-//! ends in a [`JobPanic`], so that nobody waits for it.
+//! In: [paced](crate::synthesis::pace) work, and its number of items. Out: its result, in the same frame or a later
+//! one. The result never depends on where the work is done. Dropping a [`Job`] stops it. Work that panics ends in a
+//! [`JobPanic`].
 
 use crate::plugin::order::VesselSystems;
 use crate::synthesis::pace::{Pace, at_once};
@@ -12,14 +12,13 @@ use bevy::{
     ecs::{
         change_detection::Res,
         intern::Interned,
-        reflect::ReflectResource,
-        resource::Resource,
         schedule::{IntoScheduleConfigs, ScheduleLabel},
         system::SystemParam,
     },
-    reflect::{Reflect, std_traits::ReflectDefault},
     tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready, futures_lite::FutureExt},
 };
+pub use settings::{JobMode, JobSettings};
+
 use slices::{JobSlices, Place};
 use std::{
     any::Any,
@@ -29,77 +28,12 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    time::Duration,
 };
 
+mod settings;
 mod slices;
 #[cfg(test)]
 mod tests;
-
-/// Where work is done that takes longer than a frame: tissues, indices, networks and bindings of large organs.
-///
-/// Changes concern work that begins later; a new [`slice_time`](Self::slice_time) also what is under way.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-#[reflect(Resource, Default, Clone, PartialEq)]
-pub struct JobSettings {
-    /// Who does large work.
-    ///
-    /// Default: [`JobMode::Auto`].
-    pub mode: JobMode,
-    /// Items, such as triangles or nodes, up to which work is done at once, in the frame in which it comes up.
-    ///
-    /// Higher values save small organs the frames of waiting, and let single frames take longer: some 3 ms for the default.
-    ///
-    /// Limits: none; 0 does nothing at once. Default: [`Self::DEFAULT_AT_ONCE`].
-    pub at_once: usize,
-    /// The time that all jobs together have in a frame, where they are done in slices.
-    ///
-    /// Higher values end them sooner and take more of each frame. Whatever it is, one job goes on a little in each frame, so
-    /// that all come to their end.
-    ///
-    /// Units: time on this machine. Limits: none; 0 does one stretch of one job a frame. Default:
-    /// [`Self::DEFAULT_SLICE_TIME`].
-    pub slice_time: Duration,
-}
-
-impl JobSettings {
-    /// Items up to which work is done at once.
-    pub const DEFAULT_AT_ONCE: usize = 8192;
-    /// An eighth of a frame at 60 frames a second.
-    pub const DEFAULT_SLICE_TIME: Duration = Duration::from_millis(2);
-}
-
-impl Default for JobSettings {
-    fn default() -> Self {
-        Self { mode: JobMode::Auto, at_once: Self::DEFAULT_AT_ONCE, slice_time: Self::DEFAULT_SLICE_TIME }
-    }
-}
-
-/// Who does work that is too large to be done at once.
-///
-/// What comes out is the same to the last bit; only the frame in which it comes differs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect, serde::Serialize, serde::Deserialize)]
-#[reflect(Default, Clone, PartialEq)]
-pub enum JobMode {
-    /// The task pool where it has threads of its own; in a browser, slices.
-    #[default]
-    Auto,
-    /// The task pool. In a browser its tasks hold up the frames.
-    TaskPool,
-    /// A slice in each frame, on the thread that runs the schedule: of use to try out what a browser does.
-    Slices,
-}
-
-impl JobMode {
-    fn is_sliced(self) -> bool {
-        match self {
-            Self::Auto => cfg!(target_arch = "wasm32"),
-            Self::TaskPool => false,
-            Self::Slices => true,
-        }
-    }
-}
 
 /// The work that an organ was waiting for panicked. That organ fails; the app and all other organs go on.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -107,7 +41,7 @@ impl JobMode {
     "the work on it panicked ({message}), which is a fault of bevy_vessels; please report it with mesh and settings"
 )]
 pub struct JobPanic {
-    /// What the panic said.
+    /// The message of the panic.
     pub message: String,
 }
 
@@ -119,15 +53,15 @@ impl JobPanic {
     }
 }
 
-/// What comes out of a job.
+/// The result of a job.
 type Outcome<T> = Result<T, JobPanic>;
 
-/// Does work to its end, or to its panic: what it has made by then is dropped, so that nothing half done is left.
+/// Does work until it ends or panics. A panic drops everything that the work has made.
 async fn guarded<T>(work: impl Future<Output = T>) -> Outcome<T> {
     AssertUnwindSafe(work).catch_unwind().await.map_err(|payload| JobPanic::new(&*payload))
 }
 
-/// Begins jobs.
+/// Starts jobs.
 #[derive(SystemParam)]
 pub(crate) struct Jobs<'w> {
     settings: Res<'w, JobSettings>,
@@ -135,7 +69,7 @@ pub(crate) struct Jobs<'w> {
 }
 
 impl Jobs<'_> {
-    /// Items up to which work is done at once.
+    /// Largest number of items for which work is done at once.
     pub(crate) fn at_once(&self) -> usize {
         self.settings.at_once
     }
@@ -145,7 +79,7 @@ impl Jobs<'_> {
         items <= self.at_once() && self.at_once() > 0
     }
 
-    /// Begins work on about so many items. If they are few, it is done when this returns.
+    /// Starts work on about so many items. If they are few, it is done when this returns.
     pub(crate) fn start<T, W>(&self, items: usize, work: impl FnOnce(Pace) -> W) -> Job<T>
     where
         T: Send + 'static,
@@ -161,7 +95,7 @@ impl Jobs<'_> {
     }
 }
 
-/// Work that was begun, and its result once it is there. To let go of it stops it.
+/// Work that was started, and its result once it is ready. Dropping it stops the work.
 pub(crate) struct Job<T> {
     work: Work<Outcome<T>>,
     pace: Pace,
@@ -184,7 +118,7 @@ impl<T: Send + 'static> Job<T> {
 
     fn in_task_pool<W: Future<Output = T> + Send + 'static>(work: impl FnOnce(Pace) -> W) -> Self {
         let is_dropped = Arc::<AtomicBool>::default();
-        // A task that was dropped goes no farther than to its next pause.
+        // A dropped task runs no farther than to its next pause.
         let pace = Pace::new({
             let is_dropped = Arc::clone(&is_dropped);
             move || is_dropped.load(Ordering::Relaxed)
@@ -199,7 +133,7 @@ impl<T: Send + 'static> Job<T> {
         Self { work: Work::Slices(place), pace, is_dropped }
     }
 
-    /// Whether the result is there.
+    /// Whether the result is ready.
     pub(crate) fn is_done(&self) -> bool {
         match &self.work {
             Work::Done(_) => true,
@@ -213,7 +147,7 @@ impl<T: Send + 'static> Job<T> {
         if self.is_done() { 1.0 } else { self.pace.progress() }
     }
 
-    /// Takes the result out of a job that is done, and lets go of the job.
+    /// Takes the result out of a job that is done, and drops the job.
     pub(crate) fn poll(job: &mut Option<Self>) -> Option<Outcome<T>> {
         let result = match &mut job.as_mut()?.work {
             Work::Done(result) => result.take(),
@@ -239,7 +173,7 @@ impl<T> fmt::Debug for Job<T> {
     }
 }
 
-/// Registers what jobs need, with the systems of a schedule.
+/// Registers what jobs need, with their system in a schedule.
 pub(crate) fn register(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
     app.init_resource::<JobSettings>().init_resource::<JobSlices>().register_type::<JobSettings>();
     app.add_systems(schedule, slices::advance_slices.before(VesselSystems::Source));

@@ -1,6 +1,6 @@
 //! Jobs that are done in slices: a little in each frame, on the thread that runs the schedule.
 
-use crate::plugin::job::JobSettings;
+use crate::plugin::job::settings::JobSettings;
 use crate::synthesis::pace::Pace;
 use bevy::{
     ecs::{change_detection::Res, resource::Resource},

@@ -1,4 +1,4 @@
-//! From a Bevy image to the values that a tissue is read from.
+//! From a Bevy image to the values of a tissue.
 
 use crate::synthesis::{
     pace::{Pace, Stretch},
@@ -14,10 +14,10 @@ use bevy::{
     reflect::{Reflect, std_traits::ReflectDefault},
 };
 
-/// The image that an organ's tissue is read from, where its [`Vasculature`](crate::plugin::Vasculature) has
+/// The image that an organ's tissue is read from, if its [`Vasculature`](crate::plugin::Vasculature) has
 /// [`TissueSource::Image`](crate::synthesis::tissue::TissueSource::Image) as tissue. The organ needs no mesh then.
 ///
-/// Pictures are flat tissues; 3-D textures, and 2-D ones of several layers, are solids.
+/// Pictures become flat tissues; 3-D textures, and 2-D ones with several layers, become solids.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct OrganImage(pub Handle<Image>);
@@ -28,7 +28,7 @@ pub enum OrganImageError {
     /// The file is missing or broken.
     #[error("the image asset was not loaded ({reason}); check its path")]
     NotLoaded {
-        /// What the asset server says.
+        /// The asset server's error.
         reason: String,
     },
     /// Bevy has moved the data to the graphics card.
@@ -61,13 +61,13 @@ pub enum OrganImageError {
         "the image's pixels cannot be read ({reason}); use an uncompressed format such as R8Unorm or Rgba8UnormSrgb"
     )]
     Unreadable {
-        /// What Bevy says.
+        /// Bevy's error.
         reason: String,
     },
 }
 
-/// Reads one channel of an image, with rests. Values are as they are stored, 0 to 1 in most formats: those of an sRGB format
-/// are not made linear.
+/// Reads one channel of an image, with pauses. Values are as stored, 0 to 1 in most formats: sRGB values are not made
+/// linear.
 pub(crate) async fn tissue_image(
     image: &Image,
     channel: ImageChannel,
@@ -106,7 +106,7 @@ fn check_size(image: &Image, size: UVec3) -> Result<(), OrganImageError> {
 
 fn color_at(image: &Image, at: UVec3) -> Result<Color, OrganImageError> {
     let color = match image.get_color_at_3d(at.x, at.y, at.z) {
-        // So it answers for a flat picture.
+        // Bevy returns this for a flat picture.
         Err(TextureAccessError::WrongDimension) => image.get_color_at(at.x, at.y),
         other => other,
     };
@@ -135,7 +135,7 @@ mod tests {
     use bevy::asset::RenderAssetUsages;
     use bevy::image::Image;
 
-    /// The descriptor's types are not among what the plugin's features bring, so the format is that of a default image.
+    /// The plugin's features don't enable the descriptor's types, so the format is that of a default image.
     fn two_pixels() -> Image {
         let mut image = Image::default();
         image.texture_descriptor.size.width = 2;

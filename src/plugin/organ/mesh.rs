@@ -1,4 +1,4 @@
-//! From a Bevy mesh to the triangles that tissues are made of.
+//! From a Bevy mesh to the triangles of a tissue.
 //!
 //! In: a [`Mesh`] of any index format, as a triangle list or strip. Out: a [`TriangleMesh`] in the mesh's local space.
 
@@ -14,10 +14,10 @@ use bevy::{
 /// Why a mesh cannot be an organ.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OrganMeshError {
-    /// The file is missing, broken, or has no mesh of that label.
+    /// The file is missing or broken, or has no mesh with that label.
     #[error("the mesh asset was not loaded ({reason}); check its path and label")]
     NotLoaded {
-        /// What the asset server says.
+        /// The asset server's error.
         reason: String,
     },
     /// Points and lines have no surface.
@@ -26,7 +26,7 @@ pub enum OrganMeshError {
         /// Topology of the mesh.
         found: PrimitiveTopology,
     },
-    /// There is nothing to make triangles of.
+    /// Without positions there are no triangles.
     #[error("the mesh has no positions; insert Mesh::ATTRIBUTE_POSITION")]
     NoPositions,
     /// The positions are not three floats each.
@@ -46,11 +46,11 @@ pub enum OrganMeshError {
     Triangles(#[from] MeshError),
 }
 
-/// What an organ takes over from its mesh: unchecked, so that copying is all that the frame has to wait for.
+/// The parts of a mesh that an organ needs: unchecked, so that the frame waits only for the copy.
 pub(crate) struct MeshCopy {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Texture coordinates, one per vertex, where the mesh has any.
+    /// Texture coordinates, one per vertex, if the mesh has any.
     pub(crate) uvs: Option<Vec<Vec2>>,
 }
 
@@ -63,17 +63,17 @@ impl MeshCopy {
 
 /// Reads the triangles of a mesh.
 ///
-/// Without indices the vertices follow one another. In a strip every second triangle is turned, so that all face the
-/// same way, and an index of all ones begins a new strip. Left-over vertices at the end are dropped, as the graphics card
-/// does. Vertices keep their numbers, and their texture coordinates where those are two floats each.
+/// Without indices the vertices are used in order. In a strip every second triangle is flipped, so that all face the
+/// same way, and an index with all bits set begins a new strip. Left-over vertices at the end are dropped, as on the
+/// graphics card. Vertices keep their indices, and their texture coordinates if those are two floats each.
 ///
 /// # Errors
-/// What is missing or wrong, and how to repair it.
+/// [`OrganMeshError`] if the mesh cannot be an organ.
 pub fn triangle_mesh(mesh: &Mesh) -> Result<TriangleMesh, OrganMeshError> {
     at_once(copy_mesh(mesh)?.check(&Pace::default()))
 }
 
-/// The positions of a mesh's vertices, where they are in main memory and three floats each.
+/// The positions of a mesh's vertices, if they are in main memory and three floats each.
 pub(crate) fn vertex_positions(mesh: &Mesh) -> Option<&[[f32; 3]]> {
     mesh.try_attribute(Mesh::ATTRIBUTE_POSITION).ok()?.as_float3()
 }
@@ -99,7 +99,7 @@ pub(crate) fn copy_mesh(mesh: &Mesh) -> Result<MeshCopy, OrganMeshError> {
     Ok(MeshCopy { positions, triangles, uvs })
 }
 
-/// The first texture coordinates, where they are two floats each.
+/// The first texture coordinates, if they are two floats each.
 fn uvs(mesh: &Mesh) -> Option<Vec<Vec2>> {
     match mesh.try_attribute(Mesh::ATTRIBUTE_UV_0).ok()? {
         VertexAttributeValues::Float32x2(uvs) => Some(uvs.iter().copied().map(Vec2::from).collect()),
@@ -107,7 +107,7 @@ fn uvs(mesh: &Mesh) -> Option<Vec<Vec2>> {
     }
 }
 
-/// Triangles of a row of indices. `restart` ends a strip; in a list it is a vertex like any other.
+/// Triangles of a sequence of indices. `restart` ends a strip; in a list it is a vertex like any other.
 fn triangles<I: Copy + PartialEq + Into<u32>>(indices: &[I], restart: I, topology: PrimitiveTopology) -> Vec<[u32; 3]> {
     match topology {
         PrimitiveTopology::TriangleStrip => indices.split(|&index| index == restart).flat_map(strip).collect(),
@@ -115,7 +115,7 @@ fn triangles<I: Copy + PartialEq + Into<u32>>(indices: &[I], restart: I, topolog
     }
 }
 
-/// Triangles of one strip. Those without area that only connect its parts are left out.
+/// Triangles of one strip. Those without area, which only connect its parts, are left out.
 fn strip<I: Copy + PartialEq + Into<u32>>(corners: &[I]) -> impl Iterator<Item = [u32; 3]> {
     let turned = |(i, corners): (usize, &[I])| {
         let [a, b, c] = [corners[0].into(), corners[1].into(), corners[2].into()];

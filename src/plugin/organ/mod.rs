@@ -1,4 +1,4 @@
-//! Organs as Bevy has them: meshes and images that are read, meshes kept at rest while they are deformed, or made by code.
+//! Organs in Bevy: meshes and images that are read, meshes at rest while they are deformed, and procedural meshes.
 
 pub(crate) mod image;
 pub(crate) mod mesh;

@@ -6,7 +6,8 @@ use bevy::{
     mesh::{Indices, Mesh, PrimitiveTopology},
 };
 
-/// A triangle list with positions, normals, UVs and vertex colours, kept in both worlds so that vessels can grow on it.
+/// A triangle list with positions, normals, UVs and vertex colours. Both worlds keep it, so that vessels can grow on
+/// it.
 impl From<ShadedMesh> for Mesh {
     fn from(organ: ShadedMesh) -> Self {
         Self::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())

@@ -1,8 +1,8 @@
 //! An organ's mesh at rest, kept while it is deformed.
 
 use crate::plugin::{
+    lineage::Lineage,
     organ::mesh::{MeshCopy, vertex_positions},
-    vessels::lineage::Lineage,
 };
 use bevy::{
     ecs::{component::Component, entity::Entity},
@@ -19,9 +19,9 @@ pub struct RestMesh {
     pub(crate) copy: Option<Arc<MeshCopy>>,
     /// The tissue that was prepared from it.
     pub(crate) tissue: Lineage,
-    /// Positions that the vessels followed last.
+    /// Vertex positions that the vessels last followed.
     pub(crate) followed: Vec<Vec3>,
-    /// What was warned of, once.
+    /// Whether a warning has been given.
     pub(crate) warned: bool,
 }
 
@@ -31,7 +31,7 @@ impl RestMesh {
         self.copy.as_ref().map(|copy| &copy.positions[..])
     }
 
-    /// Whether a mesh is this one deformed.
+    /// Whether a mesh is this one, deformed.
     pub(crate) fn is_of(&self, mesh: Option<&Mesh>) -> bool {
         let vertices = mesh.and_then(vertex_positions).map(<[_]>::len);
         vertices.is_some() && vertices == self.positions().map(<[_]>::len)
@@ -45,7 +45,7 @@ impl RestMesh {
 }
 
 impl RestMesh {
-    /// Takes over where the vertices are, and says whether that is elsewhere than before.
+    /// Takes over the vertex positions, and returns whether they have changed.
     pub(crate) fn take_vertices(&mut self, vertices: &[[f32; 3]]) -> bool {
         let is_same = self.followed.len() == vertices.len()
             && self.followed.iter().zip(vertices).all(|(before, now)| before.to_array() == *now);

@@ -1,27 +1,29 @@
-//! Scenes: presets as assets, and what is kept of an organ that is saved.
+//! Scenes: presets as assets, and organs that are saved.
 //!
 //! # Presets
 //!
-//! [`PresetAsset`] is a [`Preset`](crate::synthesis::preset::Preset) from a file that ends in `.vessels.ron`. An organ with a
-//! [`VesselPreset`] gets its [`Vasculature`](crate::plugin::Vasculature) from there, again whenever the file changes.
+//! [`PresetAsset`] is a [`Preset`](crate::synthesis::preset::Preset) from a file that ends in `.vessels.ron`. An organ
+//! with a [`VesselPreset`] gets its [`Vasculature`](crate::plugin::Vasculature) from it, and again whenever the file
+//! changes.
 //!
-//! # Organs that are saved
+//! # Saved organs
 //!
-//! An organ that Bevy saves in a scene, or clones, keeps all that cannot be made anew. Save its vessel entities with it:
+//! An organ that Bevy saves in a scene, or clones, keeps everything that cannot be made again. Save its vessel entities
+//! with it:
 //!
 //! | component | what is kept |
 //! |---|---|
 //! | settings, such as [`Vasculature`](crate::plugin::Vasculature) and [`Perfusion`](crate::plugin::Perfusion) | everything |
-//! | [`GrowthProgress`](crate::plugin::GrowthProgress) | how many steps are done at once after loading, as by [`GrowthAction::Finish`](crate::plugin::GrowthAction::Finish) |
+//! | [`GrowthProgress`](crate::plugin::GrowthProgress) | the number of steps, which are done at once after loading, as by [`GrowthAction::Finish`](crate::plugin::GrowthAction::Finish) |
 //! | [`Vessels`](crate::plugin::Vessels) that grew | their kind, and a hash: they grow again from mesh, settings and seed |
 //! | [`Vessels`](crate::plugin::Vessels) of a [given tree](crate::plugin::Vessels::from_tree) | everything, at rest |
-//! | [`VesselWounds`](crate::plugin::VesselWounds) | everything but the history of undo; undoing all still heals them |
+//! | [`VesselWounds`](crate::plugin::VesselWounds) | everything but the undo history; undoing all still heals them |
 //! | [`CirculationState`](crate::plugin::CirculationState) | how far open ends have clotted |
 //! | [`Patient`](crate::plugin::Patient), [`BloodLoss`](crate::plugin::BloodLoss) | everything |
-//! | [`OpenEnd`](crate::plugin::OpenEnd) entities | nothing: they are spawned anew from the wounds |
+//! | [`OpenEnd`](crate::plugin::OpenEnd) entities | nothing: the wounds spawn them again |
 //!
-//! Wounds belong to their tree. Where the tree that grew again is another one, since the mesh or the settings changed, they
-//! are dropped with a warning. A mesh that was not loaded from a file is not in a scene: give the organ its `Mesh3d` again.
+//! Wounds belong to their tree. If another tree grew because the mesh or the settings changed, they are dropped with a
+//! warning. A scene has no mesh that was not loaded from a file: give the organ its `Mesh3d` again.
 
 use crate::plugin::{
     growth::GrowthPlugin,
@@ -44,7 +46,7 @@ pub use preset_asset::{PresetAsset, PresetLoadError, PresetLoader};
 
 /// Loads presets as assets, and gives organs with a [`VesselPreset`] their vessels. Adds the [`GrowthPlugin`].
 ///
-/// Add it after `AssetPlugin`; without that no presets are loaded.
+/// Add it after `AssetPlugin`. Without that no presets are loaded.
 #[derive(Clone, Debug)]
 pub struct ScenePlugin {
     schedule: Interned<dyn ScheduleLabel>,

@@ -1,4 +1,4 @@
-//! Organs whose vessels are those of a preset file.
+//! Organs whose vessels come from a preset file.
 //!
 //! In: [`VesselPreset`] on an organ, and its asset. Out: the organ's [`Vasculature`].
 
@@ -24,12 +24,12 @@ use bevy::{
 };
 use std::collections::BTreeMap;
 
-/// Gives an organ the vessels of a preset: put it beside the organ's `Mesh3d`, in place of a
-/// [`Vasculature`], which is inserted when the preset has been loaded.
+/// Gives an organ the vessels of a preset: put it beside the organ's `Mesh3d` instead of a [`Vasculature`], which is
+/// inserted when the preset has been loaded.
 ///
-/// When the preset changes, in its file or in `Assets<PresetAsset>`, the vessels grow anew. The organ's seed stays as it is.
-/// A file that cannot be loaded is named in the log, with what is wrong: an organ that has vessels keeps them, and one that
-/// has none yet hears [`GrowthFailed`].
+/// When the preset changes, in its file or in `Assets<PresetAsset>`, the vessels grow again. The organ's seed stays.
+/// The log names a file that cannot be loaded, and what is wrong with it. An organ that has vessels keeps them then;
+/// one that has none yet gets a [`GrowthFailed`].
 ///
 /// ```
 /// # use bevy_vessels::plugin::VesselPreset;
@@ -45,7 +45,7 @@ use std::collections::BTreeMap;
 pub struct VesselPreset {
     /// The preset.
     pub preset: Handle<PresetAsset>,
-    /// The [`Vasculature::seed`] of an organ that has no vasculature yet. Default: 0.
+    /// The [`Vasculature::seed`], for an organ that has no vasculature yet. Default: 0.
     pub seed: u64,
 }
 
@@ -71,7 +71,7 @@ pub(crate) struct PresetOrgan {
     vasculature: Option<&'static mut Vasculature>,
 }
 
-/// Source: vasculatures follow presets that have been loaded or have changed.
+/// Source: updates vasculatures from presets that have been loaded or have changed.
 pub(crate) fn follow_presets(
     mut changes: MessageReader<AssetEvent<PresetAsset>>,
     mut failures: MessageReader<AssetLoadFailedEvent<PresetAsset>>,
@@ -92,7 +92,7 @@ pub(crate) fn follow_presets(
                 organ.take_over(preset, &mut commands);
                 None
             }
-            // It failed before the organ asked for it.
+            // The preset failed before the organ asked for it.
             (None, None) if is_due => match server.load_state(id) {
                 LoadState::Failed(failure) => Some(failure.to_string()),
                 _ => None,
@@ -113,7 +113,7 @@ fn changed_preset(event: &AssetEvent<PresetAsset>) -> Option<AssetId<PresetAsset
 }
 
 impl PresetOrganItem<'_, '_> {
-    /// Gives the organ what the preset says, where that is something else than it has.
+    /// Gives the organ the preset's vasculature, if that differs from its own.
     fn take_over(&mut self, preset: &PresetAsset, commands: &mut Commands) {
         let seed = self.vasculature.as_ref().map_or(self.preset.seed, |vasculature| vasculature.seed);
         let wish = Vasculature::from_preset(preset.0.clone()).with_seed(seed);
@@ -123,7 +123,7 @@ impl PresetOrganItem<'_, '_> {
         }
     }
 
-    /// Says that there is no preset, or that its file has become a bad one.
+    /// Reports that there is no preset, or that its file has become invalid.
     fn complain(&self, reason: String, failed: &mut Announcer<GrowthFailed>) {
         let organ = self.entity;
         if self.vasculature.is_some() {

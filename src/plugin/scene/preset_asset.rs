@@ -7,7 +7,7 @@ use bevy::{
 };
 use std::{io, str::Utf8Error};
 
-/// A preset as an asset. Files of presets end in `.vessels.ron`, and hold what [`Preset::from_ron`] reads.
+/// A preset as an asset. Preset files end in `.vessels.ron`, and hold what [`Preset::from_ron`] reads.
 ///
 /// To save the vessels of an organ as such a file, write `Preset::from(&vasculature).to_ron()`.
 #[derive(Asset, Reflect, Clone, Debug, PartialEq)]
@@ -24,7 +24,7 @@ impl From<Preset> for PresetAsset {
 #[derive(Clone, Copy, Debug, Default, TypePath)]
 pub struct PresetLoader;
 
-/// Why a file gives no preset.
+/// The reason why no preset could be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum PresetLoadError {
     /// It cannot be read.
@@ -35,7 +35,7 @@ pub enum PresetLoadError {
         /// Why not.
         error: io::Error,
     },
-    /// It is no text.
+    /// It is not text.
     #[error("{path} is not UTF-8 text: {error}")]
     Text {
         /// The file.
@@ -43,7 +43,7 @@ pub enum PresetLoadError {
         /// Where the text ends.
         error: Utf8Error,
     },
-    /// It is text, but no preset.
+    /// It is text, but not a preset.
     #[error("{path}: {error}")]
     Preset {
         /// The file.

@@ -1,4 +1,4 @@
-//! Cut: what is to be done to vessels is done, on all organs that it meets.
+//! Cut: carries out actions on the vessels of all organs that they meet.
 //!
 //! In: actions in world space, from [`CuttableVessels`] or as [`VesselCommand`] messages. Out: the ledgers in
 //! [`VesselWounds`](crate::plugin::VesselWounds), changed segments marked in
@@ -28,14 +28,14 @@ use bevy::{
     math::Vec3,
 };
 
-/// The door to all vessels that can be cut: what is asked for here is done in the same frame, in
-/// [`VesselSystems::Cut`](crate::plugin::VesselSystems::Cut), or in the next if that is over.
+/// Cuts, clamps, seals and heals vessels. A request is carried out in the same frame, in
+/// [`VesselSystems::Cut`](crate::plugin::VesselSystems::Cut), or in the next if that set has already run.
 ///
-/// All shapes and points are in world space; the transforms of organs and of all that they hang on are respected, with
-/// scale, mirrors and shear, as they are when the action is carried out. An action goes to all
-/// [`Cuttable`](crate::plugin::Cuttable) organs unless
-/// it names one. Results come as [`VesselOperation`] messages; the state of vessels is in their
-/// [`VesselWounds`](crate::plugin::VesselWounds) and [`OpenEnd`](crate::plugin::OpenEnd) entities.
+/// All shapes and points are in world space. The transforms of organs and their parents are respected, with scale,
+/// mirrors and shear, as they are when the action is carried out. An action goes to all
+/// [`Cuttable`](crate::plugin::Cuttable) organs unless it names one. Results come as [`VesselOperation`] messages; the
+/// state of vessels is in their [`VesselWounds`](crate::plugin::VesselWounds) and [`OpenEnd`](crate::plugin::OpenEnd)
+/// entities.
 ///
 /// ```
 /// # use bevy_vessels::{plugin::CuttableVessels, synthesis::wound::{Blade, BladeError}};
@@ -50,15 +50,15 @@ use bevy::{
 #[derive(Resource, Debug, Default)]
 pub struct CuttableVessels {
     queue: Vec<VesselCommand>,
-    /// What was done in this frame, and is to be told.
+    /// Operations of this frame, still to be announced.
     done: Vec<VesselOperation>,
     history: UndoHistory,
-    /// Organs whose transform has been complained of.
+    /// Organs whose transform has been warned of.
     warned: Vec<Entity>,
 }
 
 impl CuttableVessels {
-    /// Severs every vessel that a blade crosses; a ball or capsule also takes out what lies within it.
+    /// Severs every vessel that a blade crosses; a ball or capsule also removes what lies within it.
     pub fn cut(&mut self, blade: Blade) {
         self.request(VesselCommand::new(VesselAction::Cut(blade)));
     }
@@ -75,12 +75,12 @@ impl CuttableVessels {
         self.request(VesselCommand::new(VesselAction::Clamp(VesselSite::At { vessels, place })));
     }
 
-    /// Takes a clamp off, of those that a [`VesselOperation`] reported.
+    /// Takes off a clamp that a [`VesselOperation`] reported.
     pub fn unclamp(&mut self, vessels: Entity, clamp: ClampId) {
         self.request(VesselCommand::new(VesselAction::Unclamp { vessels, clamp }));
     }
 
-    /// Takes off the clamp that is nearest to a point, at most `reach` away; world units.
+    /// Takes off the clamp that is nearest to a point, at most `reach` away, in world units.
     pub fn unclamp_near(&mut self, point: Vec3, reach: f32) {
         self.request(VesselCommand::new(VesselAction::UnclampNear { point, reach }));
     }
@@ -92,7 +92,7 @@ impl CuttableVessels {
         self.request(VesselCommand::new(VesselAction::Ligate(VesselSite::Near { point, reach })));
     }
 
-    /// Ties off a vessel entity's vessel at a place.
+    /// Ties off the vessel at a place of a vessel entity.
     pub fn ligate_at(&mut self, vessels: Entity, place: Place) {
         self.request(VesselCommand::new(VesselAction::Ligate(VesselSite::At { vessels, place })));
     }
@@ -104,8 +104,7 @@ impl CuttableVessels {
         self.request(VesselCommand::new(VesselAction::Cauterise { volume, max_calibre }));
     }
 
-    /// What is asked for through this is part of a stroke: the sweeps of many frames, which [`undo`](Self::undo) takes
-    /// back at once.
+    /// Makes requests part of a stroke: the sweeps of many frames, which [`undo`](Self::undo) takes back together.
     ///
     /// ```
     /// # use bevy_vessels::{plugin::{CuttableVessels, StrokeId}, synthesis::wound::Blade};
@@ -132,33 +131,33 @@ impl CuttableVessels {
         Stroke { vessels: self, stroke }
     }
 
-    /// Undoes the last action or stroke that changed anything, on all the vessels that it changed. Of those that went on at
-    /// once, it is the one that began last.
+    /// Undoes the last action or stroke that changed anything, on all the vessels that it changed. If several
+    /// overlapped in time, the one that began last is undone.
     ///
     /// Blood that was lost stays lost.
     pub fn undo(&mut self) {
         self.request(VesselCommand::new(VesselAction::Undo));
     }
 
-    /// Undoes all actions: every vessel is whole. Blood that was lost stays lost.
+    /// Undoes all actions: every vessel is whole again. Blood that was lost stays lost.
     pub fn undo_all(&mut self) {
         self.request(VesselCommand::new(VesselAction::UndoAll));
     }
 
-    /// Asks for an action, on one organ or on all of them: what the other methods do, and messages.
+    /// Requests an action, on one organ or on all of them, as the other methods and messages do.
     pub fn request(&mut self, command: VesselCommand) {
         self.queue.push(command);
     }
 
-    /// Strikes a vessel entity, whose ledger has been cleared, from what can be undone.
+    /// Removes a vessel entity, whose ledger has been cleared, from the undo history.
     pub(crate) fn forget(&mut self, vessels: Entity) {
         self.history.forget(|entity| entity == vessels);
     }
 
-    /// Says what could not be done: in the log where that is news to whoever made the app.
+    /// Logs what could not be done, as a warning if the app's author must know it.
     fn complain(&mut self, error: &OperationError) {
         match *error {
-            // What an instrument misses is part of the game.
+            // An instrument may miss: that is part of the game.
             OperationError::NothingNear { .. } => debug!("{error}"),
             OperationError::Blade { organ, .. } if self.warned.contains(&organ) => {}
             _ => warn!("a vessel command was not carried out: {error}"),
@@ -174,7 +173,7 @@ impl CuttableVessels {
     }
 }
 
-/// The door, for what is part of a stroke: see [`CuttableVessels::in_stroke`]. Other actions go through
+/// Requests that are part of a stroke: see [`CuttableVessels::in_stroke`]. Other actions go through
 /// [`request`](Self::request).
 #[derive(Debug)]
 pub struct Stroke<'a> {
@@ -193,13 +192,13 @@ impl Stroke<'_> {
         self.request(VesselCommand::new(VesselAction::Cauterise { volume, max_calibre }));
     }
 
-    /// Asks for any action as part of the stroke. Undoing is part of none.
+    /// Requests any action as part of the stroke. An undo is never part of a stroke.
     pub fn request(&mut self, command: VesselCommand) {
         self.vessels.request(command.in_stroke(self.stroke));
     }
 }
 
-/// Carries out what was asked for: first what the resource holds, then messages, each in its order.
+/// Carries out requests: first those of the resource, then messages, each in their order.
 pub(crate) fn carry_out(
     mut door: ResMut<CuttableVessels>,
     mut commands: MessageReader<VesselCommand>,
@@ -222,7 +221,7 @@ pub(crate) fn carry_out(
     door.queue = queue;
 }
 
-/// Cut: tells what was done, once the entities of open ends are there.
+/// Cut: announces operations, once the entities of open ends exist.
 pub(crate) fn tell_operations(mut door: ResMut<CuttableVessels>, mut operations: Announcer<VesselOperation>) {
     if !door.done.is_empty() {
         door.done.drain(..).for_each(|operation| operations.announce(operation));

@@ -1,51 +1,31 @@
-//! What makes an organ's vessels cuttable, and the ledger of what was done to them.
+//! The ledgers that record the wounds of an organ's vessels.
 //!
 //! In: [`Cuttable`] on an organ. Out: [`VesselWounds`] on each of its vessel entities, which a regrowth clears.
 
-use crate::plugin::vessels::wounds::VesselWounds;
 use crate::plugin::{
     surgery::{
+        cuttable::Cuttable,
         cuttable_vessels::CuttableVessels,
         open_ends::{OpenEndEntities, despawn_children},
     },
-    vessels::{change_log::ChangeLog, index::VesselIndex, relations::OrganVessels, tree::Vessels},
+    vessels::{
+        change_log::ChangeLog, index::VesselIndex, relations::OrganVessels, tree::Vessels, wounds::VesselWounds,
+    },
 };
-use crate::synthesis::wound::Retraction;
 use bevy::{
     ecs::{
         change_detection::{DetectChangesMut, ResMut},
-        component::Component,
         entity::Entity,
         lifecycle::Remove,
         observer::On,
         query::{Changed, Or, With, Without},
-        reflect::ReflectComponent,
         system::{Commands, Query},
         world::EntityWorldMut,
     },
     log::warn,
-    reflect::{Reflect, std_traits::ReflectDefault},
 };
 
-/// Lets an organ's vessels be cut, clamped and cauterised: put it beside the organ's
-/// [`Vasculature`](crate::plugin::Vasculature), or on an organ with vessels of your own.
-///
-/// An organ without it pays nothing for it. Add a [`Perfusion`](crate::plugin::Perfusion), too, and open vessels bleed.
-/// Removing it makes the vessels whole again.
-///
-/// ```
-/// # use bevy_vessels::{plugin::{Cuttable, Vasculature}, synthesis::preset::PresetName};
-/// let organ = (Vasculature::new(PresetName::Colon), Cuttable::default());
-/// ```
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-#[reflect(Component, Default, Clone, PartialEq)]
-pub struct Cuttable {
-    /// How far the ends of later cuts draw back, so that a gap is seen.
-    pub retraction: Retraction,
-}
-
-/// Cut: gives a ledger to the vessels of cuttable organs, and makes all ledgers those of the present vessels.
+/// Cut: gives a ledger to the vessels of cuttable organs.
 pub(crate) fn attach_wounds(
     mut commands: Commands,
     organs: Query<&OrganVessels, With<Cuttable>>,
@@ -59,7 +39,7 @@ pub(crate) fn attach_wounds(
     }
 }
 
-/// Cut: vessels that grew anew have no wounds, but for those that they were saved with.
+/// Cut: clears the wounds of vessels that grew again, except those that they were saved with.
 pub(crate) fn clear_outdated(
     mut vessels: Query<(Entity, &Vessels, &mut VesselWounds)>,
     mut door: ResMut<CuttableVessels>,
@@ -73,7 +53,7 @@ pub(crate) fn clear_outdated(
                 wounds.resume(vessels);
                 continue;
             }
-            warn!("{entity}: its wounds are dropped: these are other vessels than those that it was saved with");
+            warn!("{entity}: its wounds are dropped: its vessels differ from those that it was saved with");
         }
         if !wounds.is_of(vessels) {
             door.bypass_change_detection().forget(entity);
@@ -86,7 +66,7 @@ pub(crate) fn clear_outdated(
     }
 }
 
-/// Cut: ledgers follow changed settings.
+/// Cut: applies changed settings to ledgers.
 pub(crate) fn follow_settings(
     organs: Query<(Entity, &Cuttable, &OrganVessels), Or<(Changed<Cuttable>, Changed<OrganVessels>)>>,
     mut wounds: Query<&mut VesselWounds>,
@@ -96,14 +76,14 @@ pub(crate) fn follow_settings(
         while let Some(mut wounds) = wounds.fetch_next() {
             let ledger = wounds.bypass_change_detection().ledger_mut();
             if let Err(error) = ledger.set_retraction(cuttable.retraction) {
-                warn!("{organ}: ends go on drawing back as before: {error}");
+                warn!("{organ}: the retraction of cut ends stays as before: {error}");
                 break;
             }
         }
     }
 }
 
-/// Vessels that are no longer cuttable are whole.
+/// Makes vessels whole when they cease to be cuttable.
 pub(crate) fn remove_wounds(
     removed: On<Remove, Cuttable>,
     organs: Query<&OrganVessels>,
@@ -120,7 +100,7 @@ pub(crate) fn remove_wounds(
     }
 }
 
-/// A ledger that is gone can't undo anything.
+/// Removes a removed ledger from the undo history.
 pub(crate) fn forget_ledger(removed: On<Remove, VesselWounds>, mut door: ResMut<CuttableVessels>) {
     door.forget(removed.entity);
 }

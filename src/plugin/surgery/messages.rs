@@ -1,4 +1,4 @@
-//! What can be done to vessels, as messages, and what came of it.
+//! Messages that ask for actions on vessels, and those that report results.
 
 use crate::synthesis::{
     tree::{Place, VesselKind},
@@ -16,8 +16,8 @@ use bevy::{
 };
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Asks for something to be done to vessels: the same as [`CuttableVessels`](crate::plugin::CuttableVessels), as a
-/// message. Carried out in the same frame or the next.
+/// Requests an action on vessels, as [`CuttableVessels`](crate::plugin::CuttableVessels) does, by a message. Carried
+/// out in the same frame or the next.
 ///
 /// ```
 /// # use bevy_vessels::{plugin::{VesselAction, VesselCommand, VesselSite}};
@@ -31,7 +31,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[derive(Message, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Message, Clone, PartialEq)]
 pub struct VesselCommand {
-    /// The organ that it is meant for; `None` for all that it meets.
+    /// The organ to act on; `None` for all that the action meets.
     pub organ: Option<Entity>,
     /// The stroke that it is part of; `None` for an action by itself.
     pub stroke: Option<StrokeId>,
@@ -58,21 +58,20 @@ impl VesselCommand {
     }
 }
 
-/// One movement of an instrument, over as many frames as it takes: what the user takes for one action, and undo takes back
-/// as one.
+/// One movement of an instrument, over any number of frames: one action for the user and for undo.
 ///
-/// Begin one when the instrument goes on, and give it to each of the sweeps that follow: by [`VesselCommand::in_stroke`] or
-/// [`CuttableVessels::in_stroke`](crate::plugin::CuttableVessels::in_stroke). It ends when it is used no more. Several may
-/// go on at once, such as those of two hands.
+/// Begin one when the movement begins, and give it to each sweep that follows, with [`VesselCommand::in_stroke`] or
+/// [`CuttableVessels::in_stroke`](crate::plugin::CuttableVessels::in_stroke). It ends when it is no longer used.
+/// Several may go on at once, such as those of two hands.
 ///
-/// What is done between two actions of a stroke, and to the same vessels, is undone together with it: a stroke that went on
-/// over it can't be taken back from under it. After an undo the stroke may go on, as one that has just begun.
+/// Other actions on the same vessels between two actions of a stroke are undone together with it, since a ledger undoes
+/// its actions in reverse order. After an undo the stroke may go on, as one that has just begun.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
 #[reflect(Clone, PartialEq)]
 pub struct StrokeId(u64);
 
 impl StrokeId {
-    /// A stroke that nothing belongs to yet.
+    /// Begins a stroke without actions.
     pub fn begin() -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         Self(NEXT.fetch_add(1, Ordering::Relaxed))
@@ -83,7 +82,7 @@ impl StrokeId {
 #[derive(Clone, Debug, PartialEq, Reflect)]
 #[reflect(Clone, PartialEq)]
 pub enum VesselAction {
-    /// Severs every vessel that the blade crosses; a ball or capsule also takes out what lies within it.
+    /// Severs every vessel that the blade crosses; a ball or capsule also removes what lies within it.
     Cut(Blade),
     /// Seals by heat all vessels up to a calibre within a ball or capsule, for good.
     Cauterise {
@@ -112,14 +111,14 @@ pub enum VesselAction {
         /// How far from it a clamp may be.
         reach: f32,
     },
-    /// Undoes the last action or stroke that changed anything, wherever it did; for one organ, the last that changed that,
-    /// there.
+    /// Undoes the last action or stroke that changed anything, on all vessels; for one organ, the last that changed it,
+    /// only there.
     Undo,
     /// Undoes all actions.
     UndoAll,
 }
 
-/// Where on the vessels something is to be done.
+/// The site on the vessels where an action takes place.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Clone, PartialEq)]
 pub enum VesselSite {
@@ -139,7 +138,7 @@ pub enum VesselSite {
     },
 }
 
-/// What kind of action it was.
+/// The kind of an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
 #[reflect(Clone, PartialEq)]
 pub enum OperationKind {
@@ -157,10 +156,10 @@ pub enum OperationKind {
     Undone,
 }
 
-/// Something was done to the vessels of one vessel entity. An action that changes several, in several organs or in arteries
-/// and veins, gives one of these for each.
+/// Something was done to the vessels of one vessel entity. An action that changes several, in several organs or in
+/// arteries and veins, sends one of these for each.
 ///
-/// Also an event on the organ, for observers. When it is told, entities for the ends that it opened are there: see
+/// Also an event on the organ, for observers. Entities for the ends that it opened already exist: see
 /// [`OpenEndEntities`](crate::plugin::OpenEndEntities).
 #[derive(Message, EntityEvent, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Message, Event, Clone, PartialEq)]
@@ -176,15 +175,15 @@ pub struct VesselOperation {
     pub operation: OperationKind,
     /// The stroke that it was part of. `None` for an undo.
     pub stroke: Option<StrokeId>,
-    /// What it changed; positions in the space of the organ's mesh. Never empty.
+    /// The changes, with positions in the space of the organ's mesh. Never empty.
     pub report: WoundReport,
 }
 
-/// An action could not be done, and changed nothing. A cut that meets no vessel is none of these.
+/// An action could not be done, and changed nothing. A cut that meets no vessel is no failure.
 #[derive(Message, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Message, Clone, PartialEq)]
 pub struct VesselOperationFailed {
-    /// What was asked for.
+    /// The command.
     pub command: VesselCommand,
     /// Why it could not be done.
     pub error: OperationError,
@@ -194,7 +193,7 @@ pub struct VesselOperationFailed {
 #[derive(Clone, Debug, PartialEq, thiserror::Error, Reflect)]
 #[reflect(opaque, Clone, Debug, PartialEq)]
 pub enum OperationError {
-    /// The ledger turned it down.
+    /// The ledger refused it.
     #[error(transparent)]
     Wound(#[from] WoundError),
     /// The blade cannot be brought into an organ's space.
@@ -215,8 +214,8 @@ pub enum OperationError {
         /// How far from there.
         reach: f32,
     },
-    /// The entity is not an organ whose vessels can be cut.
-    #[error("{organ} is no organ that can be cut; give it a Cuttable, and wait until its vessels have begun to grow")]
+    /// The entity is not an organ with vessels that can be cut.
+    #[error("{organ} is not an organ that can be cut; give it a Cuttable, and wait until its vessels begin to grow")]
     NotCuttable {
         /// The entity.
         organ: Entity,

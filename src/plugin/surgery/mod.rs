@@ -1,4 +1,4 @@
-//! Surgery: vessels are cut, clamped, tied and sealed, and healed again.
+//! Surgery: vessels are cut, clamped, tied, sealed, and healed again.
 
 use crate::plugin::{
     order::{self, VesselSystems},
@@ -12,15 +12,16 @@ use bevy::{
     },
 };
 
-pub(crate) mod cuttable_vessels;
-pub(crate) mod ledgers;
+pub(crate) mod cuttable;
+mod cuttable_vessels;
+mod ledgers;
 pub(crate) mod messages;
 pub(crate) mod open_ends;
 mod operate;
 mod undo;
 
+pub use cuttable::Cuttable;
 pub use cuttable_vessels::{CuttableVessels, Stroke};
-pub use ledgers::Cuttable;
 pub use messages::{
     OperationError, OperationKind, StrokeId, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed,
     VesselSite,

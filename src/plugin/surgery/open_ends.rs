@@ -1,7 +1,7 @@
-//! Open ends of severed vessels as entities: where blood leaves, for particles, sounds and instruments.
+//! Open ends of severed vessels as entities, for particles, sounds and instruments where blood leaves.
 //!
-//! In: the ledgers in [`VesselWounds`]. Out: one entity with an [`OpenEnd`] for each open lumen, child of its vessel
-//! entity, that moves with the tissue and is despawned when the lumen closes.
+//! In: the ledgers in [`VesselWounds`]. Out: one entity with an [`OpenEnd`] for each open lumen, a child of its vessel
+//! entity. It moves with the tissue and is despawned when the lumen closes.
 
 use crate::plugin::vessels::{relations::VesselsOf, tree::Vessels, wounds::VesselWounds};
 use crate::synthesis::tree::VesselTree;
@@ -28,15 +28,15 @@ use bevy::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An open end of a severed vessel. For reading: the plugin writes it.
+/// An open end of a severed vessel. Read-only: the plugin writes it.
 ///
-/// The entity's `Transform` is at the end's tip and faces out of the lumen (its forward direction), in the space of the
+/// The entity's `Transform` is at the end's tip and its forward direction points out of the lumen, in the space of the
 /// organ's mesh. Blood leaves it only where the organ has a [`Perfusion`](crate::plugin::Perfusion).
 ///
-/// A particle system, on the CPU or the GPU, needs these entities and no more: emit [`flow`](Self::flow) times the frame's
-/// duration at the `GlobalTransform`, with [`velocity`](Self::velocity) along its forward direction. An entity comes with
-/// its end and goes when that is closed; the rest is told by [`BleedingStarted`](crate::plugin::BleedingStarted) and
-/// [`BleedingStopped`](crate::plugin::BleedingStopped).
+/// A particle system, on the CPU or the GPU, needs only these entities: emit [`flow`](Self::flow) times the frame's
+/// duration at the `GlobalTransform`, with [`velocity`](Self::velocity) along its forward direction. The entity is
+/// spawned with its end and despawned when that closes. [`BleedingStarted`](crate::plugin::BleedingStarted) and
+/// [`BleedingStopped`](crate::plugin::BleedingStopped) tell when it bleeds.
 ///
 /// ```
 /// # use bevy_vessels::plugin::OpenEnd;
@@ -60,13 +60,13 @@ pub struct OpenEnd {
     /// The vessel entity.
     #[entities]
     pub vessels: Entity,
-    /// What kind of vessel it is an end of.
+    /// The kind of the severed vessel.
     pub kind: VesselKind,
-    /// What the ledger knows it by.
+    /// Its identifier in the ledger.
     pub id: EndId,
-    /// Where on the tree it is.
+    /// Its place on the tree.
     pub place: Place,
-    /// Which side of the cut it is.
+    /// Its side of the cut.
     pub side: EndSide,
     /// Position in the space of the organ's mesh.
     pub position: Vec3,
@@ -76,15 +76,15 @@ pub struct OpenEnd {
     pub radius: f32,
     /// Number of bifurcations between the root and here.
     pub bifurcations: u32,
-    /// What leaves it, as a mean over the last frame.
+    /// The blood that leaves it, as a mean over the last frame.
     pub flow: Flow,
     /// Pressure in the vessel before the hole.
     pub pressure: Pressure,
     /// Mean velocity in the hole, in m/s: how fast a drop leaves.
     pub velocity: f64,
-    /// What it has lost since it was opened.
+    /// Volume lost since it was opened.
     pub lost: Volume,
-    /// Whether it bleeds, and if not, why.
+    /// Whether it bleeds, and why not.
     pub state: EndState,
 }
 
@@ -109,13 +109,13 @@ impl OpenEnd {
         }
     }
 
-    /// Bleeds no more, for want of blood.
+    /// Stops bleeding, because the vessel no longer carries blood.
     pub(crate) fn dry(&mut self) {
         (self.flow, self.pressure, self.velocity) = (Flow::ZERO, Pressure::ZERO, 0.0);
         self.state = EndState::Dry;
     }
 
-    /// Where it is and where it faces.
+    /// Its position and direction.
     fn pose(end: &SeveredEnd) -> Transform {
         Transform::from_translation(end.position).looking_to(end.direction, end.direction.any_orthogonal_vector())
     }
@@ -128,18 +128,18 @@ impl OpenEnd {
 pub struct OpenEndEntities(BTreeMap<EndId, Entity>);
 
 impl OpenEndEntities {
-    /// The entity of an end, while that is open.
+    /// The entity of an end, while the end is open.
     pub fn get(&self, end: EndId) -> Option<Entity> {
         self.0.get(&end).copied()
     }
 
-    /// All ends, in the order in which they were made.
+    /// All ends, in the order of their creation.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (EndId, Entity)> + '_ {
         self.0.iter().map(|(&end, &entity)| (end, entity))
     }
 }
 
-/// Cut: open ends that came with a scene or a clone go; those of the vessels there are spawned with their wounds.
+/// Cut: despawns open ends that came with a scene or a clone; the wounds of the vessels spawn new ones.
 pub(crate) fn despawn_strays(
     mut commands: Commands,
     new: Query<(Entity, &OpenEnd), Added<OpenEnd>>,
@@ -153,7 +153,7 @@ pub(crate) fn despawn_strays(
     }
 }
 
-/// Cut: an entity for each end that is open now, and none for others.
+/// Cut: spawns an entity for each end that has opened, and despawns the entities of closed ends.
 pub(crate) fn spawn_open_ends(
     mut commands: Commands,
     mut vessels: Query<(Entity, &VesselsOf, &Vessels, &VesselWounds, &mut OpenEndEntities), Changed<VesselWounds>>,
@@ -182,13 +182,13 @@ pub(crate) fn despawn_children(mut parent: EntityWorldMut, unwanted: Vec<Entity>
     let (gone, kept): (Vec<Entity>, Vec<Entity>) = children.partition(|child| unwanted.contains(child));
     parent.replace_related_with_difference::<ChildOf>(&gone, &kept, &[]);
     let world = parent.into_world_mut();
-    // Those that someone has given another parent, too.
+    // This includes those that the app has given another parent.
     for child in unwanted {
         world.try_despawn(child).ok();
     }
 }
 
-/// Publish: open ends move with their vessels.
+/// Publish: moves open ends with their vessels.
 pub(crate) fn move_open_ends(
     vessels: Query<(&Vessels, &VesselWounds, &OpenEndEntities), Or<(Changed<Vessels>, Changed<VesselWounds>)>>,
     mut ends: Query<(&mut OpenEnd, &mut Transform)>,

@@ -1,8 +1,9 @@
-//! How an action on vessels is carried out: on which organs, in whose space, and what is remembered for undo.
+//! Carries out an action on vessels: on the organs that it meets, in the space of each, with an entry in the undo
+//! history.
 
 use crate::plugin::{
     surgery::{
-        ledgers::Cuttable,
+        cuttable::Cuttable,
         messages::{OperationError, OperationKind, VesselAction, VesselCommand, VesselOperation, VesselSite},
         undo::UndoHistory,
     },
@@ -41,7 +42,7 @@ pub(crate) struct Operated {
     changes: &'static mut ChangeLog,
 }
 
-/// All that an action may meet.
+/// Everything that an action may change or read.
 #[derive(SystemParam)]
 pub(crate) struct OperatingField<'w, 's> {
     organs: Query<'w, 's, (Entity, &'static OrganVessels), With<Cuttable>>,
@@ -56,7 +57,7 @@ struct Target {
     vessels: Entity,
 }
 
-/// What came of a command.
+/// The result of a command.
 #[derive(Debug, Default)]
 pub(crate) struct Outcome {
     pub(crate) done: Vec<VesselOperation>,
@@ -77,7 +78,7 @@ type Operations = Result<Vec<VesselOperation>, OperationError>;
 type Report = Result<WoundReport, OperationError>;
 
 impl OperatingField<'_, '_> {
-    /// Carries out a command, and takes note of it in the history.
+    /// Carries out a command, and enters it in the history.
     pub(crate) fn carry_out(&mut self, command: &VesselCommand, history: &mut UndoHistory) -> Outcome {
         let targets = match self.targets(command.organ) {
             Ok(targets) => targets,
@@ -129,12 +130,13 @@ impl OperatingField<'_, '_> {
         }
     }
 
-    /// From the space of a vessel entity to the world. `None` where a parent has no transform: it is not in the world.
+    /// From the space of a vessel entity to the world. `None` if a parent has no transform: the entity is not in the
+    /// world then.
     fn to_world(&self, target: Target) -> Option<Affine3A> {
         self.transforms.compute_global_transform(target.vessels).ok().map(|global| global.affine())
     }
 
-    /// Does something to the ledger of a vessel entity, and reports it if it changed anything.
+    /// Applies an operation to the ledger of a vessel entity, and reports it if it changed anything.
     fn operate(
         &mut self,
         target: Target,
@@ -166,8 +168,8 @@ impl OperatingField<'_, '_> {
         })
     }
 
-    /// Does something with a blade to each target, in that target's space and with its mean scale. A target for which
-    /// it fails doesn't keep it from the others; what would fail for all is said once.
+    /// Applies a blade to each target, in that target's space and with its mean scale. If it fails for one target, it
+    /// goes on with the others. Equal errors are reported once.
     fn sweep(
         &mut self,
         targets: &[Target],
@@ -274,7 +276,7 @@ impl OperatingField<'_, '_> {
                     |wounds: &mut Wounds, indexed: &IndexedVessels| Ok(wounds.undo_last(actions, indexed.tree()));
                 done.extend(self.operate(*target, OperationKind::Undone, undo).ok().flatten());
             }
-            // What a regrowth has cleared is nothing to undo: the one before it is meant.
+            // An entry that a regrowth has cleared has nothing to undo, so the one before it is undone.
             if !done.is_empty() {
                 return done;
             }

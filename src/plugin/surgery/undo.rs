@@ -1,23 +1,23 @@
-//! In which order undo takes back what was done: one entry for each action, or for each stroke of an instrument.
+//! The undo history: one entry for each action, or for each stroke of an instrument.
 //!
-//! A ledger undoes its own actions in the reverse of their order. What is undone together must therefore be the last on
-//! each ledger that it changed: entries are joined where a stroke goes on after something else was done to its vessels.
+//! A ledger undoes its actions in reverse order. Actions that are undone together must therefore be the last on each
+//! ledger that they changed: if a stroke goes on after other actions on its vessels, their entries are joined.
 
 use crate::plugin::surgery::messages::StrokeId;
 use bevy::ecs::entity::Entity;
 
-/// Everything that can be undone, in the order in which it was begun.
+/// Everything that can be undone, in the order of beginning.
 #[derive(Debug, Default)]
 pub(crate) struct UndoHistory {
     entries: Vec<Entry>,
 }
 
-/// What is undone at once.
+/// Actions that are undone together.
 #[derive(Debug, Default)]
 struct Entry {
-    /// None for an action by itself; several where strokes were joined.
+    /// Empty for an action by itself; several if strokes were joined.
     strokes: Vec<StrokeId>,
-    /// Vessel entities, each once, and how many actions of their ledgers belong to this.
+    /// Vessel entities, each once, with the number of their ledger's actions in this entry.
     changed: Vec<(Entity, usize)>,
 }
 
@@ -35,7 +35,7 @@ impl Entry {
 }
 
 impl UndoHistory {
-    /// Takes note of an action that changed the ledgers of some vessel entities.
+    /// Enters an action that changed the ledgers of some vessel entities.
     pub(crate) fn note(&mut self, stroke: Option<StrokeId>, changed: impl Iterator<Item = Entity> + Clone) {
         let begun = stroke.and_then(|stroke| self.entries.iter().rposition(|entry| entry.strokes.contains(&stroke)));
         let at = begun.unwrap_or_else(|| {
@@ -48,7 +48,7 @@ impl UndoHistory {
         changed.for_each(|vessels| self.entries[at].add(vessels, 1));
     }
 
-    /// Makes one entry of all from a number on.
+    /// Joins all entries from an index on.
     fn join_from(&mut self, at: usize) {
         for later in self.entries.split_off(at + 1) {
             self.entries[at].strokes.extend(later.strokes);
@@ -56,8 +56,8 @@ impl UndoHistory {
         }
     }
 
-    /// Takes out the last entry that has to do with some of these vessel entities, as far as it does: how many actions
-    /// are to be undone on which of them.
+    /// Takes the part of the last entry that concerns some of these vessel entities: the number of actions to undo on
+    /// each.
     pub(crate) fn take_last(&mut self, is_meant: impl Fn(Entity) -> bool) -> Option<Vec<(Entity, usize)>> {
         let at = self.entries.iter().rposition(|entry| entry.changed.iter().any(|&(vessels, _)| is_meant(vessels)))?;
         let (taken, left) = std::mem::take(&mut self.entries[at].changed)
@@ -70,7 +70,7 @@ impl UndoHistory {
         Some(taken)
     }
 
-    /// Strikes vessel entities from what can be undone.
+    /// Removes vessel entities from the history.
     pub(crate) fn forget(&mut self, is_meant: impl Fn(Entity) -> bool) {
         self.entries.iter_mut().for_each(|entry| entry.changed.retain(|&(vessels, _)| !is_meant(vessels)));
         self.entries.retain(|entry| !entry.changed.is_empty());

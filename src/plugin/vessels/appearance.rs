@@ -1,4 +1,4 @@
-//! How vessels look, said on their organ.
+//! The appearance of vessels, set on their organ.
 
 use crate::{
     plugin::vessels::{relations::OrganVessels, tree::Vessels},
@@ -14,25 +14,25 @@ use bevy::{
     reflect::{Reflect, std_traits::ReflectDefault},
 };
 
-/// What the colour of a segment tells.
+/// The meaning of a segment's colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum SegmentColoring {
-    /// What kind of vessel it is.
+    /// Its kind of vessel.
     #[default]
     Kind,
-    /// How thick it is.
+    /// Its radius.
     Radius,
-    /// In which step it was born.
+    /// The step in which it was born.
     Age,
     /// Its Strahler order: 1 for terminals, rising towards the root.
     StrahlerOrder,
-    /// How much of its blood it still carries: the kind's colour where that is all, pale where it is none. Of use once
-    /// vessels are cut or clamped.
+    /// Share of its blood flow that is left: the kind's colour for all, pale for none. Useful once vessels are cut or
+    /// clamped.
     Supply,
 }
 
-/// How an organ's vessels look.
+/// The appearance of an organ's vessels.
 #[derive(Component, Clone, Debug, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
@@ -41,15 +41,15 @@ pub struct VesselAppearance {
     ///
     /// Default: [`Self::DEFAULT_COLORS`].
     pub colors: ByKind<Color>,
-    /// What the colours tell. Default: the kind.
+    /// The meaning of the colours. Default: the kind.
     pub coloring: SegmentColoring,
     /// Which kinds are shown. Default: all.
     pub shown: ByKind<bool>,
 }
 
 impl VesselAppearance {
-    /// Default colours. Arteries: blood full of oxygen, seen through a wall. Veins: the blue violet in which textbooks and
-    /// thin walls show them. Portal veins: the same, darker. Ducts: the green of bile.
+    /// Default colours. Arteries: oxygenated blood, seen through a wall. Veins: the blue violet of textbooks and thin
+    /// walls. Portal veins: the same, darker. Ducts: the green of bile.
     pub const DEFAULT_COLORS: ByKind<Color> = ByKind {
         artery: Color::srgb(0.62, 0.05, 0.06),
         vein: Color::srgb(0.25, 0.16, 0.47),
@@ -57,7 +57,7 @@ impl VesselAppearance {
         duct: Color::srgb(0.30, 0.42, 0.14),
     };
 
-    /// What the vessel entity of a kind is given.
+    /// The visibility of the vessel entity of a kind.
     pub(crate) fn visibility(&self, kind: VesselKind) -> Visibility {
         if self.shown[kind] { Visibility::Inherited } else { Visibility::Hidden }
     }
@@ -69,7 +69,7 @@ impl Default for VesselAppearance {
     }
 }
 
-/// Publish: shows and hides kinds of vessels as the organ's appearance says.
+/// Publish: shows or hides kinds of vessels as the organ's appearance says.
 pub(crate) fn show_kinds(
     organs: Query<(&VesselAppearance, &OrganVessels), Changed<VesselAppearance>>,
     mut vessels: Query<(&Vessels, &mut Visibility)>,

@@ -1,23 +1,23 @@
-//! What changed in the vessels of an entity, for any number of readers, each at its own pace.
+//! The changes in the vessels of an entity, for any number of readers, each at its own pace.
 //!
-//! In: nodes that a writer marks. Out: for each reader, the segments that changed since it last looked. A writer doesn't
+//! In: nodes that a writer marks. Out: for each reader, the segments that changed since it last read. A writer doesn't
 //! know its readers: each node has a stamp, the revision of its last change, and a reader remembers a revision.
 
-use crate::plugin::vessels::{changes::Changes, lineage::Lineage};
+use crate::plugin::{lineage::Lineage, vessels::changes::Changes};
 use bevy::ecs::component::Component;
 
-/// When each segment of a vessel entity last changed.
+/// The last change of each segment of a vessel entity.
 ///
-/// A segment has changed when either of its ends moved or changed its radius, or when something was done to it: cut,
-/// clamped, sealed or healed. While an organ grows, those are a tenth of all segments in a step, scattered over the whole
-/// tree along the paths from the new tips to the roots; so each segment has a stamp of its own.
+/// A segment has changed if either of its ends moved or changed its radius, or if it was cut, clamped, sealed or
+/// healed. While an organ grows, a step changes a tenth of all segments, scattered over the whole tree along the paths
+/// from the new tips to the roots. Therefore each segment has a stamp of its own.
 ///
-/// Whoever keeps something that follows from segments, such as a buffer on the graphics card, a file or a texture, reads
-/// with a [`ChangeCursor`] of its own, as often as it likes. Reading changes nothing for other readers.
+/// Code that keeps data derived from segments, such as a buffer on the graphics card, a file or a texture, reads with
+/// its own [`ChangeCursor`], as often as it likes. Reading changes nothing for other readers.
 ///
-/// The plugin marks what it changes, and marks everything where [`Vessels`](crate::plugin::Vessels) take the place of
-/// others. Whoever changes vessels by hand has [`Vessels::update_from_tree`](crate::plugin::Vessels::update_from_tree)
-/// mark what became different.
+/// The plugin marks what it changes, and marks everything when [`Vessels`](crate::plugin::Vessels) are replaced. An app
+/// that changes vessels itself calls [`Vessels::update_from_tree`](crate::plugin::Vessels::update_from_tree), which
+/// marks the differences.
 ///
 /// Memory: 4 bytes a node, once nodes are marked one by one.
 ///
@@ -36,9 +36,9 @@ use bevy::ecs::component::Component;
 /// ```
 #[derive(Component, Debug)]
 pub struct ChangeLog {
-    /// Tells this log, and its count of revisions, from others.
+    /// Identity of this log and its count of revisions.
     id: Lineage,
-    /// The tree that it is about.
+    /// The logged tree.
     tree: Lineage,
     /// Revision of the last change.
     revision: u32,
@@ -46,11 +46,11 @@ pub struct ChangeLog {
     all: u32,
     /// Revision of each node's last change, 0 for none.
     stamps: Vec<[u32; 64]>,
-    /// What the stamps say together, which is enough for most readers.
+    /// Summaries of the stamps, which are enough for most readers.
     words: Vec<Word>,
 }
 
-/// What the stamps of 64 nodes say together.
+/// Summary of the stamps of 64 nodes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Word {
     /// The largest stamp.
@@ -81,10 +81,9 @@ impl Word {
     }
 }
 
-/// How far a reader of a [`ChangeLog`] has read. The default has seen nothing, so that everything counts as changed.
+/// A reader's position in a [`ChangeLog`]. The default has seen nothing, so everything counts as changed.
 ///
-/// It belongs to the log that it last read. To any other, such as that of an entity that took the first one's place, it is
-/// as one that has seen nothing.
+/// It belongs to the log that it last read. In any other log, such as that of a replacing entity, it has seen nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ChangeCursor {
     log: Lineage,
@@ -92,10 +91,10 @@ pub struct ChangeCursor {
 }
 
 impl ChangeCursor {
-    /// What changed since this cursor last read, and moves the cursor to the present.
+    /// Returns the changes since this cursor last read, and moves the cursor to the present.
     ///
-    /// The cost is that of a glance at 64 nodes at a time, and of a comparison for each of those 64 where more than one
-    /// change is to be read.
+    /// The cost is one check for every 64 nodes, and a comparison of each of the 64 if they have more than one change
+    /// to read.
     #[must_use = "the cursor has moved on: what changed is told once"]
     pub fn read(&mut self, log: &ChangeLog) -> Changes {
         let seen = std::mem::replace(self, log.now());
@@ -127,7 +126,7 @@ impl ChangeLog {
         }
     }
 
-    /// Marks every segment that there is, however many that are.
+    /// Marks every segment, however many there are.
     pub fn mark_all(&mut self) {
         self.begin_revision();
         self.all = self.revision;
@@ -138,18 +137,18 @@ impl ChangeLog {
         ChangeCursor { log: self.id, revision: self.revision }
     }
 
-    /// Whether the log is about this tree.
+    /// Whether the log is that of this tree.
     pub(crate) fn is_of(&self, tree: Lineage) -> bool {
         self.tree == tree
     }
 
-    /// Begins with another tree, of which everything is new.
+    /// Begins with another tree, in which everything is new.
     pub(crate) fn begin_tree(&mut self, tree: Lineage) {
         self.tree = tree;
         self.mark_all();
     }
 
-    /// Counts up. After the last revision the log begins anew as another one, so that no reader misses anything.
+    /// Counts up. After the last revision the log starts over with another identity, so that no reader misses anything.
     fn begin_revision(&mut self) {
         self.revision = self.revision.checked_add(1).unwrap_or_else(|| {
             *self = Self { tree: self.tree, ..Self::default() };
@@ -180,7 +179,7 @@ impl Default for ChangeLog {
     }
 }
 
-/// A bit for each stamp above a revision. Without branches, so that the comparisons are done many at a time.
+/// A bit for each stamp above a revision. Without branches, so that the comparisons are vectorised.
 fn newer(stamps: &[u32; 64], revision: u32) -> u64 {
     /// Moves the lowest bit of each byte, the first byte's first, into the highest byte.
     const GATHER: u64 = 0x0102_0408_1020_4080;
@@ -202,7 +201,7 @@ mod tests {
 
     const NODES: usize = 1000;
 
-    /// A reader, and what a slow twin of the log says that it has not seen yet.
+    /// A reader, and the nodes that it has not seen yet according to a slow reference log.
     #[derive(Default)]
     struct Reader {
         cursor: ChangeCursor,
@@ -223,7 +222,7 @@ mod tests {
         }
     }
 
-    /// Random marks, with readers that look every frame, every few, and hardly ever.
+    /// Random marks, with readers that read every frame, every few frames, and very seldom.
     fn read_at_different_rates(mut log: ChangeLog, seed: u64) {
         let mut rng = Stream::Statistics.rng(seed);
         let new = |period| Reader { period, unseen: (0..NODES).collect(), ..Reader::default() };

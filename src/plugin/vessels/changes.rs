@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-/// Which segments changed since a reader last looked. Each is known by the node in which it ends.
+/// The segments that changed since a reader last read. Each is identified by its end node.
 ///
 /// A tree may also have become shorter: then every segment counts as changed, and those from
 /// [`VesselTree::len`](crate::synthesis::tree::VesselTree::len) on are gone.
 ///
-/// A value of its own: a reader may keep it and work on it over several frames, and add segments that it has reasons of
-/// its own to do again.
+/// It is independent of the log: a reader may work on it over several frames, and add segments that it wants to process
+/// again.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Changes {
     /// One bit per node; the last word has a bit set.
@@ -21,7 +21,7 @@ impl Changes {
     /// Every segment, however many there are.
     pub(super) const ALL: Self = Self { nodes: Vec::new(), all: true };
 
-    /// The nodes whose bits are set. The last word has one.
+    /// The nodes whose bits are set. The last word must have one.
     pub(super) fn of_words(nodes: Vec<u64>) -> Self {
         debug_assert!(nodes.last() != Some(&0), "whether there are changes is told by the number of words");
         Self { nodes, all: false }
@@ -93,7 +93,7 @@ impl Changes {
 
     /// Ranges of changed nodes of a tree of `len` nodes: neighbours joined, in rising order.
     ///
-    /// The cost is that of a glance at 64 nodes at a time, and of the ranges.
+    /// The cost is one check for every 64 nodes, plus the ranges.
     pub fn dirty_ranges(&self, len: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         let mut node = 0;
         std::iter::from_fn(move || {

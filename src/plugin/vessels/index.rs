@@ -1,14 +1,15 @@
-//! Which segments of a vessel entity an instrument may meet, at any moment of a growth and without holding up a frame.
+//! Finds the segments of a vessel entity that an instrument may meet, at any time of a growth and without delaying a
+//! frame.
 //!
-//! In: [`Vessels`] and their [`ChangeLog`]. Out: candidates for a cut or a touch, and what a ray meets first. Small trees
-//! are indexed when they are first asked about. Large ones are indexed in jobs from then on; what the index doesn't hold
-//! yet is searched one by one, so that an answer is complete at any time, and the same.
+//! In: [`Vessels`] and their [`ChangeLog`]. Out: candidates for a cut or a touch, and the first hit of a ray. Small
+//! trees are indexed at their first query. Jobs index large ones from then on. Segments that the index doesn't hold yet
+//! are searched one by one, so an answer is always complete and the same.
 
 use crate::plugin::{
     job::{Job, JobSettings, Jobs},
+    lineage::Lineage,
     vessels::{
         change_log::{ChangeCursor, ChangeLog},
-        lineage::Lineage,
         tree::Vessels,
     },
 };
@@ -23,33 +24,33 @@ use bevy::{
 };
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-/// An index over the segments of a vessel entity. Every vessel entity has one, which is empty and costs nothing until
-/// someone asks.
+/// An index over the segments of a vessel entity. Every vessel entity has one, which is empty and free until the first
+/// query.
 ///
-/// [`VesselPicker`](crate::plugin::VesselPicker) and [`CuttableVessels`](crate::plugin::CuttableVessels) ask it. Questions
-/// take it as it is, without `&mut`: it follows the vessels when it is asked.
+/// [`VesselPicker`](crate::plugin::VesselPicker) and [`CuttableVessels`](crate::plugin::CuttableVessels) query it. A
+/// query needs no `&mut`: the index follows the vessels when it is queried.
 #[derive(Component, Debug, Default)]
 pub struct VesselIndex {
-    /// Written by questions that find it outdated, and read by the others.
+    /// Queries that find it outdated write it; the others read it.
     state: RwLock<IndexState>,
 }
 
 #[derive(Debug)]
 struct IndexState {
     index: SegmentIndex,
-    /// The changes that the index has followed.
+    /// The changes that the index has taken over.
     cursor: ChangeCursor,
-    /// The tree that is indexed.
+    /// The indexed tree.
     tree: Lineage,
-    /// Whether anyone has ever asked.
+    /// Whether there has been a query.
     is_wanted: bool,
-    /// A newer index on its way.
+    /// A newer index that is being made.
     coming: Option<Job<ComingIndex>>,
     /// Whether the work on one panicked. It isn't tried again for the same tree.
     has_failed: bool,
-    /// Nodes up to which a tree is indexed when it is asked about.
+    /// Largest number of nodes for which a query indexes the tree itself.
     at_once: usize,
-    /// Nodes of the tree in the last frame, and for how many frames there were so many.
+    /// Nodes of the tree in the last frame, and the number of frames without a change of it.
     len: usize,
     idle_frames: u32,
 }
@@ -58,7 +59,7 @@ struct IndexState {
 #[derive(Debug)]
 struct ComingIndex {
     index: SegmentIndex,
-    /// The changes that it has followed: those until the tree was copied.
+    /// The changes that it has taken over: those until the tree was copied.
     cursor: ChangeCursor,
 }
 
@@ -85,10 +86,10 @@ impl Default for IndexState {
 }
 
 impl VesselIndex {
-    /// Frames without growth after which what it left is indexed.
+    /// Frames without growth after which the remaining nodes are indexed.
     const IDLE_FRAMES: u32 = 10;
 
-    /// Nodes that the index holds; the others are searched one by one.
+    /// Number of nodes in the index; the others are searched one by one.
     pub fn indexed(&self) -> usize {
         self.read().index.len()
     }
@@ -99,13 +100,13 @@ impl VesselIndex {
         state.tree == vessels.lineage() && state.index.len() == vessels.tree().len()
     }
 
-    /// Has large vessels indexed before the first question, so that this is quick, too. The plugin does so for
+    /// Has large vessels indexed before the first query, so that this is quick, too. The plugin does so for
     /// [`Cuttable`](crate::plugin::Cuttable) organs.
     pub fn prepare(&self) {
         self.write().is_wanted = true;
     }
 
-    /// The index, right for the vessels as they are, for any number of questions. The log is that of the same entity.
+    /// The index, up to date with the vessels, for any number of queries. The log is that of the same entity.
     pub(crate) fn search<'a>(&'a self, vessels: &'a Vessels, log: &ChangeLog) -> IndexedVessels<'a> {
         let state = self.read();
         if state.is_wanted && state.follows(vessels, log) {
@@ -118,7 +119,7 @@ impl VesselIndex {
         IndexedVessels { vessels, state: RwLockWriteGuard::downgrade(state) }
     }
 
-    /// A question that panicked leaves an index that is outdated at worst, which the next one sees.
+    /// A query that panicked leaves at worst an outdated index, which the next one detects.
     fn read(&self) -> RwLockReadGuard<'_, IndexState> {
         self.state.read().unwrap_or_else(PoisonError::into_inner)
     }
@@ -129,14 +130,14 @@ impl VesselIndex {
 }
 
 impl IndexState {
-    /// Whether the index is that of the vessels as they are, as far as it goes.
+    /// Whether the index is up to date with the vessels, for the nodes that it holds.
     fn follows(&self, vessels: &Vessels, log: &ChangeLog) -> bool {
         let len = vessels.tree().len();
         let is_long_enough = self.index.len() == len || len > self.at_once;
         self.tree == vessels.lineage() && self.index.len() <= len && is_long_enough && self.cursor.is_current(log)
     }
 
-    /// Measures what changed, and indexes the new nodes of a small tree.
+    /// Updates changed segments, and indexes the new nodes of a small tree.
     fn follow(&mut self, vessels: &Vessels, log: &ChangeLog) {
         self.forget_others(vessels);
         let (tree, known) = (vessels.tree(), self.index.len());
@@ -159,7 +160,7 @@ impl IndexState {
         }
     }
 
-    /// Takes over an index that has become ready, and begins to index a large tree anew where that pays.
+    /// Takes over an index that has become ready, and starts indexing a large tree again when that pays.
     fn advance(&mut self, vessels: &Vessels, log: &ChangeLog, jobs: &Jobs) {
         self.at_once = jobs.at_once();
         match Job::poll(&mut self.coming) {
@@ -183,7 +184,7 @@ impl IndexState {
     }
 }
 
-/// Vessels with their index, for questions. Both stay as they are while this is held.
+/// Vessels with their index, for queries. Both stay as they are while this is held.
 #[derive(Debug)]
 pub(crate) struct IndexedVessels<'a> {
     pub(crate) vessels: &'a Vessels,
@@ -211,8 +212,8 @@ impl IndexedVessels<'_> {
         }
     }
 
-    /// Lets a ray meet the segments that lie in its way. `pieces` gives what is left of each, as shares of the way from
-    /// the parent's node.
+    /// Casts a ray against the segments in its way. `pieces` gives the remaining parts of each, as shares of the way
+    /// from the parent's node.
     pub(crate) fn cast<Pieces>(&self, ray: &mut RayCast, pieces: impl Fn(NodeId) -> Pieces)
     where
         Pieces: IntoIterator<Item = [f32; 2]>,
@@ -237,7 +238,7 @@ impl SegmentSearch for &IndexedVessels<'_> {
     }
 }
 
-/// Cut: indexes that someone asked go on being made.
+/// Cut: advances the indexes that have been queried.
 pub(crate) fn index_vessels(mut vessels: Query<(&Vessels, &ChangeLog, &mut VesselIndex)>, jobs: Jobs) {
     for (vessels, log, mut index) in &mut vessels {
         let state = index.bypass_change_detection().state.get_mut().unwrap_or_else(PoisonError::into_inner);

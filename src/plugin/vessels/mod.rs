@@ -1,4 +1,4 @@
-//! Vessel entities: the tree of one kind of vessels, what changed in it, what was done to it, and how it looks.
+//! Vessel entities: the tree of one kind of vessels, with its changes, its wounds and its appearance.
 
 use crate::plugin::{
     job,
@@ -16,7 +16,6 @@ pub(crate) mod appearance;
 pub(crate) mod change_log;
 pub(crate) mod changes;
 pub(crate) mod index;
-pub(crate) mod lineage;
 pub(crate) mod pick;
 pub(crate) mod relations;
 mod saved;
@@ -32,10 +31,10 @@ pub use relations::{OrganVessels, VesselsOf};
 pub use tree::Vessels;
 pub use wounds::VesselWounds;
 
-/// What every room needs of vessel entities: that they are shown or hidden, and indexed. And what takes longer than a
+/// The common base of all rooms: vessel entities are shown or hidden, and indexed, and work that takes longer than a
 /// frame is done as [`JobSettings`](crate::plugin::JobSettings) say.
 ///
-/// The other plugins of vessels add it themselves.
+/// The other vessel plugins add it themselves.
 #[derive(Clone, Debug)]
 pub struct VesselsPlugin {
     schedule: Interned<dyn ScheduleLabel>,

@@ -1,5 +1,5 @@
-//! Which vessel is nearest to a point of the world, or in the way of a ray: what was clicked, or what an instrument
-//! touches.
+//! Finds the vessel that is nearest to a point of the world or hit by a ray: the one clicked, or touched by an
+//! instrument.
 //!
 //! In: vessel entities with their [`VesselIndex`], and a point or a ray in world space. Out: a [`VesselPlace`].
 
@@ -36,20 +36,20 @@ pub struct VesselPlace {
     pub kind: VesselKind,
     /// Where on the tree.
     pub place: Place,
-    /// Where its centre line is, in world space.
+    /// Position on its centre line, in world space.
     pub position: Vec3,
-    /// How far its wall is, in world units: from the point, negative within the vessel; or along the ray, 0 where that
-    /// begins within.
+    /// Distance to its wall, in world units: from the point, negative inside the vessel; or along the ray, 0 if that
+    /// begins inside.
     pub distance: f32,
 }
 
-/// Finds vessels in world space, of all organs, shown or hidden.
+/// Finds vessels of all organs in world space, shown or hidden.
 ///
-/// Where an organ is [`Cuttable`](crate::plugin::Cuttable), only what is left of severed vessels is found. Transforms are
-/// those of the organ and of all that it hangs on, as they are when it is asked. Of equally near vessels that of the lowest
-/// entity and node counts.
+/// If an organ is [`Cuttable`](crate::plugin::Cuttable), only the remaining parts of severed vessels are found.
+/// Transforms are those of the organ and its parents at the time of the query. Of equally near vessels, the one with
+/// the lowest entity and node is returned.
 ///
-/// The first question about vessels indexes them; see [`VesselIndex`]. Vessels out of reach are not asked about.
+/// The first query of vessels indexes them; see [`VesselIndex`]. Vessels out of reach are not queried.
 ///
 /// ```
 /// # use bevy_vessels::plugin::VesselPicker;
@@ -85,7 +85,7 @@ impl PickableItem<'_, '_> {
         self.index.search(self.vessels, self.log)
     }
 
-    /// What was done to these vessels, and not to others before them.
+    /// The wounds of these vessels, not of others before them.
     fn wounds(&self) -> Option<&Wounds> {
         self.wounds.filter(|wounds| wounds.is_of(self.vessels)).map(VesselWounds::ledger)
     }
@@ -97,11 +97,10 @@ impl PickableItem<'_, '_> {
 }
 
 impl VesselPicker<'_, '_> {
-    /// The place, where there still is a vessel, that is nearest to a point; `None` where no vessel's wall is within
-    /// `reach`, which is finite. World units.
+    /// The nearest place of a remaining vessel to a point; `None` if no vessel's wall is within `reach`, which is
+    /// finite. World units.
     ///
-    /// Under a scale that is not the same along all axes, centre lines are where they are drawn, and radii count by the
-    /// mean scale, as for a cut.
+    /// Under a non-uniform scale, centre lines are where they are drawn, and radii use the mean scale, as for a cut.
     pub fn nearest(&self, point: Vec3, reach: f32) -> Option<VesselPlace> {
         self.best(reach, |found, to_world, reach| {
             let touch = Touch { point, reach, to_world };
@@ -109,17 +108,17 @@ impl VesselPicker<'_, '_> {
         })
     }
 
-    /// The place where a ray meets a vessel's wall first, at most `reach` from its origin; `reach` may be infinite. World
-    /// units.
+    /// The place where a ray first hits a vessel's wall, at most `reach` from its origin; `reach` may be infinite.
+    /// World units.
     ///
-    /// What is met is what is drawn, under any scale, mirror or shear. `distance` is along the ray; the place is that of
-    /// the centre line behind the wall that was met. Light passes through a gap, but not into the lumen beside it: a vessel
-    /// that was cut is closed there by a flat face.
+    /// The ray hits what is drawn, under any scale, mirror or shear. `distance` is along the ray; the place is on the
+    /// centre line behind the hit wall. The ray passes through a gap, but not into the lumen beside it: a flat face
+    /// closes a cut vessel there.
     pub fn ray(&self, ray: Ray3d, reach: f32) -> Option<VesselPlace> {
         self.best(reach, |found, to_world, reach| first_place(ray, reach, to_world, found))
     }
 
-    /// The best of what is found in each vessel entity, each asked for what is no farther than the best before it.
+    /// The nearest result of all vessel entities. Each is queried only up to the nearest result before it.
     fn best(&self, reach: f32, find: impl Fn(&PickableItem, Affine3A, f32) -> Option<Near>) -> Option<VesselPlace> {
         let mut best: Option<VesselPlace> = None;
         for found in &self.vessels {
@@ -145,7 +144,7 @@ pub(crate) struct Near {
     pub(crate) distance: f32,
 }
 
-/// A point to look around, in the world, and where the vessels are in it.
+/// A point in the world with a reach, and the transform of the vessels.
 pub(crate) struct Touch {
     pub(crate) point: Vec3,
     pub(crate) reach: f32,
@@ -153,14 +152,14 @@ pub(crate) struct Touch {
 }
 
 impl Touch {
-    /// The box, in the space of the vessels, of all that may be within reach; `None` where that is nowhere.
+    /// The box, in the space of the vessels, of everything that may be within reach; `None` if there is none.
     fn region(&self, vessels: &Vessels) -> Option<Region> {
         let &Self { point, reach, to_world } = self;
         let to_local = to_world.inverse();
         if !(point.is_finite() && reach.is_finite() && to_local.is_finite()) {
             return None;
         }
-        // Half the box, in local space, of a ball of radius 1 in the world.
+        // Half extent, in local space, of the box around a world ball of radius 1.
         let unit = Vec3::from_array(std::array::from_fn(|axis| to_local.matrix3.row(axis).length()));
         let scaled = unit * mean_scale(&to_world);
         let half = reach.max(0.0) * unit + unevenness(scaled) * vessels.widest_radius();
@@ -174,8 +173,8 @@ impl Touch {
     }
 }
 
-/// The place of a tree whose wall is nearest to a point of the world. Radii count by the mean scale; centre lines are
-/// measured in the world, whatever the scale of the axes.
+/// The place of a tree whose wall is nearest to a point of the world. Radii use the mean scale; distances to centre
+/// lines are measured in the world, under any scale.
 pub(crate) fn nearest_place(touch: &Touch, indexed: &IndexedVessels, wounds: Option<&Wounds>) -> Option<Near> {
     let &Touch { point, reach, to_world } = touch;
     let (tree, scale) = (indexed.tree(), mean_scale(&to_world));
@@ -187,7 +186,7 @@ pub(crate) fn nearest_place(touch: &Touch, indexed: &IndexedVessels, wounds: Opt
         for [from, to] in pieces_left(wounds, node) {
             let along = b - a;
             let share = (point - a).dot(along) / along.length_squared();
-            // Not a number where the segment has no length.
+            // NaN if the segment has no length.
             let share = if share.is_nan() { from } else { share.clamp(from, to) };
             let position = a.lerp(b, share);
             let near = Near { place: Place::new(node, share), position, distance: position.distance(point) - radius };
@@ -202,7 +201,7 @@ pub(crate) fn nearest_place(touch: &Touch, indexed: &IndexedVessels, wounds: Opt
     best
 }
 
-/// What is left of a segment, as shares of the way from the parent's node.
+/// The remaining parts of a segment, as shares of the way from the parent's node.
 fn pieces_left(wounds: Option<&Wounds>, node: NodeId) -> impl Iterator<Item = [f32; 2]> {
     let severed = wounds.filter(|wounds| wounds.is_severed(node));
     let whole = severed.is_none().then_some([0.0, 1.0]);
@@ -210,16 +209,16 @@ fn pieces_left(wounds: Option<&Wounds>, node: NodeId) -> impl Iterator<Item = [f
     whole.into_iter().chain(pieces.map(|piece| [piece.from, piece.to]))
 }
 
-/// The place of a tree that a ray of the world meets first.
+/// The place of a tree that a world ray hits first.
 ///
-/// Transforms keep lines straight, and the order of what lies on them: the ray meets in the space of the vessels what it
-/// meets in the world.
+/// Transforms keep lines straight and the order of points on them, so the ray hits the same things in the space of the
+/// vessels as in the world.
 fn first_place(ray: Ray3d, reach: f32, to_world: Affine3A, found: &PickableItem) -> Option<Near> {
-    /// What rounding may take off the reach.
+    /// Margin for rounding errors of the reach.
     const ROOM: f32 = 1.0 + 1.0e-6;
     let to_local = to_world.inverse();
     let (from, direction) = (to_local.transform_point3(ray.origin), to_local.transform_vector3(*ray.direction));
-    // How long a unit of the world is along the ray.
+    // Local length of a world unit along the ray.
     let stretch = direction.length();
     let mut cast = RayCast::new(from, direction, reach * stretch * ROOM)?;
     let around = found.vessels.aabb();
@@ -235,12 +234,12 @@ fn first_place(ray: Ray3d, reach: f32, to_world: Affine3A, found: &PickableItem)
     (near.distance <= reach).then_some(near)
 }
 
-/// Cube root of how much larger volumes are in the world.
+/// Cube root of the factor by which volumes are larger in the world.
 pub(crate) fn mean_scale(to_world: &Affine3A) -> f32 {
     bevy::math::ops::cbrt(to_world.matrix3.determinant().abs())
 }
 
-/// By how many of its radii a vessel may reach out of its box, where axes have other scales than the mean.
+/// Number of its radii by which a vessel may extend beyond its box, along axes whose scale differs from the mean.
 fn unevenness(scaled_unit: Vec3) -> Vec3 {
     (scaled_unit - 1.0).max(Vec3::ZERO)
 }

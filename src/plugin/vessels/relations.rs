@@ -1,4 +1,4 @@
-//! Which vessels are whose: the relation of vessel entities to their organ.
+//! The relationship between vessel entities and their organ.
 
 use bevy::{
     ecs::{
@@ -19,7 +19,7 @@ use bevy::{
 #[relationship(relationship_target = OrganVessels)]
 pub struct VesselsOf(pub Entity);
 
-/// The vessel entities of an organ, one for each kind. They are despawned with it.
+/// The vessel entities of an organ, one for each kind. They are despawned with the organ.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 #[relationship_target(relationship = VesselsOf, linked_spawn)]
@@ -32,10 +32,10 @@ impl OrganVessels {
     }
 }
 
-/// Mends the relations of organs that came with a scene or are clones.
+/// Repairs the relationships of organs that came with a scene or are clones.
 ///
-/// A scene may hold an organ without its vessels, whose entities are none then. And where Bevy clones what is related in two
-/// ways, as an organ and its vessels are, it maps one of them to entities that never are.
+/// A scene may hold an organ without its vessels, whose entities don't exist then. When Bevy clones entities that are
+/// related in two ways, as an organ and its vessels are, it maps one relationship to entities that never exist.
 pub(crate) fn mend_relations(
     mut organs: Query<(Entity, &mut OrganVessels)>,
     new_vessels: Query<(Entity, &VesselsOf, Option<&ChildOf>), Added<VesselsOf>>,

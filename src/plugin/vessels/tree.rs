@@ -1,6 +1,12 @@
-//! The tree of a vessel entity, kept up to date with a growth at the cost of what changed.
+//! The tree of a vessel entity, which follows a growth at a cost that depends on the changes alone.
 
-use crate::plugin::vessels::{change_log::ChangeLog, lineage::Lineage, saved::clone_as_saved};
+use crate::plugin::{
+    lineage::Lineage,
+    vessels::{
+        change_log::ChangeLog,
+        saved::{GivenTree, SavedVessels},
+    },
+};
 use crate::synthesis::{
     binding::{Binding, BindingError},
     growth::GrownTree,
@@ -9,20 +15,28 @@ use crate::synthesis::{
 use bevy::{
     camera::{primitives::Aabb, visibility::Visibility},
     ecs::{
-        component::Component, lifecycle::HookContext, query::Changed, reflect::ReflectComponent, system::Query,
+        component::Component,
+        entity::{ComponentCloneCtx, SourceComponent},
+        lifecycle::HookContext,
+        query::Changed,
+        reflect::ReflectComponent,
+        system::Query,
         world::DeferredWorld,
     },
     math::Vec3,
     reflect::{Reflect, ReflectDeserialize, ReflectSerialize},
     transform::components::Transform,
 };
+use serde::{Deserialize, Serialize, Serializer};
 use std::borrow::Cow;
 
-/// The vessels of one kind of an organ, as they are drawn and written: in the local space of the organ's mesh, lifted
-/// off its surface where the settings say so.
+/// The vessels of one kind of an organ, as drawn and written: in the local space of the organ's mesh, and lifted off
+/// its surface if the settings say so.
 ///
-/// Scenes and clones of the entity keep a given tree, but not one that grew: that grows again from mesh, settings and seed.
-#[derive(Component, Clone, Debug, Reflect)]
+/// Scenes and clones of the entity keep a given tree. A tree that grew is not kept: it grows again from mesh, settings
+/// and seed.
+#[derive(Component, Clone, Debug, Reflect, Deserialize)]
+#[serde(from = "SavedVessels")]
 #[component(on_insert = mark_inserted, clone_behavior = Custom(clone_as_saved))]
 #[reflect(opaque, Component, Clone(Vessels::as_saved), Debug, PartialEq, Serialize, Deserialize)]
 #[require(ChangeLog, Transform, Visibility)]
@@ -36,7 +50,7 @@ pub struct Vessels {
     /// Next child of the same parent, [`NO_PARENT`] for the last.
     next_siblings: Vec<u32>,
     bounds: Option<(Vec3, Vec3)>,
-    /// At least the largest radius.
+    /// Upper bound of all radii.
     widest_radius: f32,
     /// Positions at rest, while the organ is deformed.
     rest: Option<Vec<Vec3>>,
@@ -66,10 +80,10 @@ impl Vessels {
 
     /// Vessels that did not grow here, such as a network read from a file, to be drawn like others.
     ///
-    /// Put them on an entity that is [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. Where they
-    /// take the place of others, wounds of these are forgotten, and every segment counts as changed;
-    /// [`update_from_tree`](Self::update_from_tree) keeps what goes on. Nodes beyond the end of `birth_steps` count as
-    /// born in step 0.
+    /// Put them on an entity that is [`VesselsOf`](crate::plugin::VesselsOf) an organ, which needs no mesh. If they
+    /// replace others, the wounds of those are dropped, and every segment counts as changed;
+    /// [`update_from_tree`](Self::update_from_tree) avoids this. Nodes beyond the end of `birth_steps` count as born in
+    /// step 0.
     pub fn from_tree(kind: VesselKind, tree: &VesselTree, birth_steps: &[u32]) -> Self {
         let mut vessels = Self { lineage: Lineage::new_one(), is_grown: false, ..Self::new(kind) };
         for (node, (&position, &radius)) in tree.positions().iter().zip(tree.radii()).enumerate() {
@@ -78,12 +92,11 @@ impl Vessels {
         vessels
     }
 
-    /// Takes over what became of vessels that did not grow here: nodes that moved, have another radius or birth step,
-    /// and new ones.
+    /// Updates vessels that did not grow here: moved nodes, changed radii or birth steps, and new nodes.
     ///
-    /// Exactly the segments that differ are marked in `log`, the [`ChangeLog`] of the same entity. Wounds stay as long as
-    /// every node that was there keeps its parent. Otherwise, and where the tree became shorter, these count as other
-    /// vessels, as with [`from_tree`](Self::from_tree). The cost is that of a comparison of all nodes.
+    /// Exactly the segments that differ are marked in `log`, the [`ChangeLog`] of the same entity. Wounds stay if every
+    /// old node keeps its parent. Otherwise, or if the tree became shorter, these count as other vessels, as with
+    /// [`from_tree`](Self::from_tree). The cost is a comparison of all nodes.
     pub fn update_from_tree(&mut self, tree: &VesselTree, birth_steps: &[u32], log: &mut ChangeLog) {
         let known = self.tree.len();
         if !tree.parents().starts_with(self.tree.parents()) {
@@ -118,19 +131,14 @@ impl Vessels {
     }
 
     /// The tree. While the organ grows, it only gets longer and thicker; a restart empties it. With
-    /// [`FollowsMesh`](crate::plugin::FollowsMesh) its nodes are where the deformed organ has them.
+    /// [`FollowsMesh`](crate::plugin::FollowsMesh) its nodes move with the deformed organ.
     pub fn tree(&self) -> &VesselTree {
         &self.tree
     }
 
-    /// Which tree it is.
+    /// Identity of the tree.
     pub(crate) fn lineage(&self) -> Lineage {
         self.lineage
-    }
-
-    /// Whether the tree is that of a growth, and not a given one.
-    pub(crate) fn is_grown(&self) -> bool {
-        self.is_grown
     }
 
     /// Hash of the tree at rest, or of the one that was saved, until it has grown again.
@@ -138,9 +146,9 @@ impl Vessels {
         if self.tree.is_empty() { self.saved_hash } else { Some(self.tree_at_rest().hash64()) }
     }
 
-    /// Takes note of the tree that they were saved with.
-    pub(crate) fn awaiting(self, saved_hash: Option<u64>) -> Self {
-        Self { saved_hash, ..self }
+    /// The vessels with only what a file keeps.
+    pub(crate) fn as_saved(&self) -> Self {
+        SavedVessels::from(self).into()
     }
 
     /// Whether the tree is the one that they were saved with.
@@ -153,17 +161,17 @@ impl Vessels {
         &self.birth_steps
     }
 
-    /// A box that holds every segment, radii included; of no size where there is none.
+    /// A box that holds every segment, radii included; of zero size if there is none.
     ///
     /// While vessels grow at rest it only becomes larger.
     pub fn aabb(&self) -> Aabb {
         self.bounds.map_or_else(Aabb::default, |(min, max)| Aabb::from_min_max(min, max))
     }
 
-    /// Takes over what the growth changed: `changed` nodes and all new ones, or everything where that is `None`.
+    /// Takes over the growth's changes: `changed` nodes and all new ones, or everything for `None`.
     ///
-    /// Without a growth nothing is left. All segments that are other than before are marked in the log. Another lineage
-    /// is another tree, of which everything is taken over.
+    /// Without a growth, the vessels are emptied. All changed segments are marked in the log. Another lineage is
+    /// another tree, which is taken over as a whole.
     pub(crate) fn follow(
         &mut self,
         grown: Option<GrownTree>,
@@ -210,7 +218,7 @@ impl Vessels {
         self.rest = None;
     }
 
-    /// The tree where it grew, however its organ is deformed.
+    /// The tree at rest, however its organ is deformed.
     pub(crate) fn tree_at_rest(&self) -> Cow<'_, VesselTree> {
         let Some(rest) = &self.rest else { return Cow::Borrowed(&self.tree) };
         let mut tree = self.tree.clone();
@@ -231,7 +239,7 @@ impl Vessels {
         Ok(())
     }
 
-    /// Brings the nodes back to where they grew, and says whether they were elsewhere.
+    /// Brings the nodes back to rest, and returns whether they were elsewhere.
     pub(crate) fn come_to_rest(&mut self) -> bool {
         let Some(rest) = self.rest.take() else { return false };
         self.tree.positions_mut().copy_from_slice(&rest);
@@ -276,12 +284,12 @@ impl Vessels {
         self.enclose(node);
     }
 
-    /// At least the largest radius of all segments.
+    /// Upper bound of the radii of all segments.
     pub(crate) fn widest_radius(&self) -> f32 {
         self.widest_radius
     }
 
-    /// Whether some segment, as thick as its own node throughout, may have a point in common with a box.
+    /// Whether some segment may share a point with a box. A segment counts with the radius of its own node throughout.
     pub(crate) fn may_meet(&self, min: Vec3, max: Vec3) -> bool {
         let room = self.widest_radius;
         self.bounds.is_some_and(|(low, high)| (low - room).cmple(max).all() && (high + room).cmpge(min).all())
@@ -300,14 +308,45 @@ impl Vessels {
     }
 }
 
-/// Which tree of a growth it is makes no difference.
+/// Equality ignores the lineage.
 impl PartialEq for Vessels {
     fn eq(&self, other: &Self) -> bool {
         (self.kind, &self.tree, &self.birth_steps) == (other.kind, &other.tree, &other.birth_steps)
     }
 }
 
-/// Vessels that are inserted are others than those that were there.
+impl From<&Vessels> for SavedVessels {
+    fn from(vessels: &Vessels) -> Self {
+        let tree = || vessels.tree_at_rest().into_owned();
+        let given = (!vessels.is_grown).then(|| GivenTree { tree: tree(), birth_steps: vessels.birth_steps.clone() });
+        Self { kind: vessels.kind, hash: vessels.hash(), given }
+    }
+}
+
+impl From<SavedVessels> for Vessels {
+    fn from(saved: SavedVessels) -> Self {
+        let vessels = match &saved.given {
+            Some(GivenTree { tree, birth_steps }) => Self::from_tree(saved.kind, tree, birth_steps),
+            None => Self::new(saved.kind),
+        };
+        Self { saved_hash: saved.hash, ..vessels }
+    }
+}
+
+impl Serialize for Vessels {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SavedVessels::from(self).serialize(serializer)
+    }
+}
+
+/// Clones vessels with only what a file keeps, since each clone has a growth of its own.
+fn clone_as_saved(source: &SourceComponent, context: &mut ComponentCloneCtx) {
+    if let Some(vessels) = source.read::<Vessels>() {
+        context.write_target_component(vessels.as_saved());
+    }
+}
+
+/// Inserted vessels replace those that were there.
 fn mark_inserted(mut world: DeferredWorld, HookContext { entity, .. }: HookContext) {
     let lineage = world.get::<Vessels>(entity).map(Vessels::lineage);
     let log = world.get_mut::<ChangeLog>(entity);
@@ -316,7 +355,7 @@ fn mark_inserted(mut world: DeferredWorld, HookContext { entity, .. }: HookConte
     }
 }
 
-/// Publish: vessels that were written over in place are others than those that were there, too.
+/// Publish: vessels that were overwritten in place count as replaced, too.
 pub(crate) fn mark_replaced(mut vessels: Query<(&Vessels, &mut ChangeLog), Changed<Vessels>>) {
     for (vessels, mut log) in &mut vessels {
         if !log.is_of(vessels.lineage()) {

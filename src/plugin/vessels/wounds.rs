@@ -1,7 +1,10 @@
-//! The ledger of what was done to the vessels of a vessel entity.
+//! The ledger of a vessel entity's wounds.
 
 use crate::{
-    plugin::vessels::{change_log::ChangeLog, lineage::Lineage, tree::Vessels},
+    plugin::{
+        lineage::Lineage,
+        vessels::{change_log::ChangeLog, tree::Vessels},
+    },
     synthesis::{
         tree::Place,
         wound::{ClampId, WoundReport, Wounds},
@@ -14,21 +17,21 @@ use bevy::{
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::{collections::BTreeSet, ops::Deref};
 
-/// All that was done to the vessels of a vessel entity. For reading, as a [`Wounds`]: operate through
+/// Everything that was done to the vessels of a vessel entity. Read-only, as a [`Wounds`]: operate through
 /// [`CuttableVessels`](crate::plugin::CuttableVessels).
 ///
-/// Changed only in frames in which something was done. The segments that an action changed are marked in the entity's
+/// It changes only in frames with an action. The segments that an action changed are marked in the entity's
 /// [`ChangeLog`].
 ///
-/// Scenes and clones of the entity keep it, but for the history of undo. There it is empty until the vessels are there, too;
-/// and it stays empty, with a warning, where these are others than those that it was saved with.
+/// Scenes and clones of the entity keep it, except for the undo history. There it is empty until the vessels have grown
+/// again. It stays empty, with a warning, if these differ from those that it was saved with.
 #[derive(Component, Debug, Default, Reflect)]
 #[reflect(opaque, Component, Default, Clone, Debug, Serialize, Deserialize)]
 pub struct VesselWounds {
     wounds: Wounds,
     lineage: Lineage,
     clamps: BTreeSet<ClampId>,
-    /// What was done to the vessels that are still to grow again.
+    /// The wounds of vessels that have still to grow again.
     saved: Option<Box<Wounds>>,
 }
 
@@ -38,7 +41,7 @@ impl VesselWounds {
         &self.wounds
     }
 
-    /// The clamps that are on, in the order in which they were put on, and where.
+    /// The clamps that are on and their places, in the order in which they were put on.
     pub fn clamps(&self) -> impl Iterator<Item = (ClampId, Place)> + '_ {
         self.clamps.iter().filter_map(|&clamp| Some((clamp, self.wounds.clamp_place(clamp)?)))
     }
@@ -47,7 +50,7 @@ impl VesselWounds {
         &mut self.wounds
     }
 
-    /// Takes note of what an action changed.
+    /// Marks the changes of an action.
     pub(crate) fn note(&mut self, report: &WoundReport, changes: &mut ChangeLog) {
         self.clamps.extend(&report.clamped);
         for clamp in &report.unclamped {
@@ -69,22 +72,22 @@ impl VesselWounds {
         self.saved = None;
     }
 
-    /// What was done to the vessels that the ledger was saved with, while it waits for them.
+    /// The wounds of the vessels that the ledger was saved with, while it waits for them.
     pub(crate) fn saved(&self) -> Option<&Wounds> {
         self.saved.as_deref()
     }
 
-    /// Takes up what was done to the vessels before they were saved, now that they are there again.
+    /// Restores the wounds of vessels that were saved and have grown again.
     pub(crate) fn resume(&mut self, vessels: &Vessels) {
         let Some(mut saved) = self.saved.take() else { return };
-        // Those of the ledger at hand are within their limits: they follow the organ's settings.
+        // The present ledger's retraction is within its limits: it follows the organ's settings.
         saved.set_retraction(self.wounds.retraction()).ok();
         self.lineage = vessels.lineage();
         self.clamps = saved.clamps().collect();
         self.wounds = *saved;
     }
 
-    /// What a file keeps.
+    /// The wounds that a file keeps.
     fn kept(&self) -> Wounds {
         self.saved.as_deref().unwrap_or(&self.wounds).without_history()
     }

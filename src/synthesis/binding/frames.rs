@@ -1,11 +1,11 @@
-//! Four vectors at a time, coordinate by coordinate, and the frames that nodes are offset in.
+//! Four vectors at a time, coordinate by coordinate, and the frames of node offsets.
 //!
-//! A frame takes two roots and two divisions, which are as quick for four as for one. All of it is the same for a vector
-//! wherever it stands among the four.
+//! A frame takes two roots and two divisions, which are as fast for four as for one. Results don't depend on a vector's
+//! position among the four.
 
 use bevy_math::{Mat4, Vec3A, Vec4};
 
-/// Nodes that are measured together.
+/// Number of nodes processed together.
 pub(super) const LANES: usize = 4;
 
 /// Four vectors.
@@ -57,28 +57,28 @@ impl From<Vectors> for [Vec3A; LANES] {
     }
 }
 
-/// Four frames of unit vectors, or zero where they have no direction.
+/// Four frames of unit vectors, or of zero vectors if they have no direction.
 pub(super) struct Frames {
-    /// Along the part of an edge across the normal.
+    /// Along the part of an edge perpendicular to the normal.
     pub along: Vectors,
-    /// Across both.
+    /// Perpendicular to both others.
     pub across: Vectors,
     /// Along the normal.
     pub up: Vectors,
 }
 
 impl Frames {
-    /// The frames of edges and normals of any length, whose products stay within f32.
+    /// The frames of edges and normals of any length whose products stay within f32.
     pub fn new(edges: Vectors, normals: Vectors) -> Self {
         let square = normals.dot(normals);
         let along = edges.times(square).minus(normals.times(normals.dot(edges)));
-        // Both at the end, where they don't wait for each other.
+        // Both at the end, so that they don't wait for each other.
         let (long, short) = (inverse_root(along.dot(along)), inverse_root(square));
         Self { along: along.times(long), across: normals.cross(along).times(long * short), up: normals.times(short) }
     }
 }
 
-/// 1/√square; 0 where that isn't finite.
+/// 1/√square; 0 if that isn't finite.
 fn inverse_root(squares: Vec4) -> Vec4 {
     Vec4::from_array(squares.to_array().map(|square| {
         let inverse = 1.0 / square.sqrt();

@@ -1,17 +1,17 @@
 //! Vessels bound to a deforming organ: nodes follow its surface, or the tetrahedra of its volume.
 //!
-//! In: a [`VesselTree`] and the organ at rest, a [`TriangleMesh`] or a [`TetMesh`]; then, each frame, the positions that
-//! a soft body gives the organ's vertices. Out: positions of the nodes.
+//! In: a [`VesselTree`] and the organ at rest, a [`TriangleMesh`] or a [`TetMesh`]; then, each frame, the positions of
+//! the organ's vertices from a soft body. Out: positions of the nodes.
 //!
 //! On a surface a node is bound to the nearest triangle: by the weights of its corners, and by the node's offset in a
-//! frame of the triangle's longest edge and the interpolated normal. So a node on the surface stays on it however that
-//! is stretched, and one above or below it keeps its distance. In tetrahedra a node is bound by its weights for the four
-//! corners of the one that holds it, so that it follows any affine motion exactly; a node outside all of them follows
-//! the nearest, extrapolated.
+//! frame of the triangle's longest edge and the interpolated normal. So a node on the surface stays on it under any
+//! stretching, and one above or below it keeps its distance. In tetrahedra a node is bound by its weights for the four
+//! corners of the one that contains it, so it follows any affine motion exactly; a node outside all of them follows the
+//! nearest by extrapolation.
 //!
-//! Radii stay as they are: how a vessel narrows when it is stretched depends on its pressure, which is not known here.
-//! Nothing is known of cuts either. A [`Place`](crate::synthesis::tree::Place) on a segment moves with the segment's
-//! ends, so what was cut stays cut at the same spot of the vessel.
+//! Radii stay as they are: the narrowing of a stretched vessel depends on its pressure, which is not known here. Cuts
+//! are not known, either. A [`Place`](crate::synthesis::tree::Place) on a segment moves with the segment's ends, so a
+//! cut stays at the same spot of the vessel.
 
 mod frames;
 mod surface;
@@ -27,23 +27,20 @@ use bevy_math::Vec3;
 use surface::SurfaceBonds;
 use tetrahedra::SolidBonds;
 
-/// Fewest triangles, or fours of nodes, worth handing to another thread.
-const WORTH_SHARING: usize = 2048;
-
-/// Why nodes could not follow. Nothing has been moved then.
+/// The reason why nodes could not follow. Nothing has moved then.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BindingError {
-    /// Another number of vertices than the organ has.
+    /// A number of vertices that differs from the organ's.
     #[error(
         "{given} vertex positions for an organ of {bound} vertices; give one for each vertex of the mesh that was bound to"
     )]
     VertexCount {
-        /// Vertices of the organ that was bound to.
+        /// Vertices of the bound organ.
         bound: usize,
         /// Positions given.
         given: usize,
     },
-    /// Another number of nodes than are bound.
+    /// A number of nodes that differs from the bound ones.
     #[error("{given} nodes to move, but {bound} are bound; call extend with the tree at rest after it grew")]
     NodeCount {
         /// Nodes bound.
@@ -51,22 +48,22 @@ pub enum BindingError {
         /// Nodes given.
         given: usize,
     },
-    /// A vertex that is infinite or not a number.
+    /// A vertex that is infinite or NaN.
     #[error(
         "vertex {vertex} moved to {position}; every coordinate must be finite: the soft body may have become unstable"
     )]
     Vertex {
         /// The first such vertex.
         vertex: usize,
-        /// Where it is said to be.
+        /// Its given position.
         position: Vec3,
     },
 }
 
 /// The nodes of one tree, bound to one organ.
 ///
-/// It keeps the organ at rest, so that nodes which grow later can be bound: growth goes on at rest, and what follows is
-/// a copy of the positions. Memory: 32 bytes a node, and about 200 bytes a triangle or tetrahedron.
+/// It keeps the organ at rest, so that nodes which grow later can be bound: growth goes on at rest, and a copy of the
+/// positions follows the organ. Memory: 32 bytes per node, and about 200 bytes per triangle or tetrahedron.
 #[derive(Clone, Debug)]
 pub struct Binding {
     bonds: Bonds,
@@ -81,13 +78,13 @@ enum Bonds {
 impl Binding {
     /// Binds every node of a tree to the nearest triangle of a mesh, both at rest.
     ///
-    /// Of equally near triangles the first counts; degenerate ones are left out. Vertices at the same position count as
-    /// one for normals, so that seams don't show.
+    /// Of equally near triangles, the first is used; degenerate ones are left out. Vertices at the same position share
+    /// their normal, so that seams don't show.
     pub fn to_surface(tree: &VesselTree, mesh: &TriangleMesh) -> Self {
         at_once(Self::to_surface_paced(tree, mesh, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub async fn to_surface_paced(tree: &VesselTree, mesh: &TriangleMesh, pace: &Pace) -> Self {
         let bonds = SurfaceBonds::new(mesh, &pace.part(0.0..0.3)).await;
         let mut binding = Self { bonds: Bonds::Surface(Box::new(bonds)) };
@@ -95,29 +92,29 @@ impl Binding {
         binding
     }
 
-    /// Binds every node of a tree to the tetrahedron that holds it, or else to the nearest, both at rest.
+    /// Binds every node of a tree to the tetrahedron that contains it, or else to the nearest, both at rest.
     ///
-    /// Of several that hold it, on a common face, the first counts; degenerate ones are left out. A node outside is
+    /// Of several that contain it, on a common face, the first is used; degenerate ones are left out. A node outside is
     /// extrapolated: its weights leave the range from 0 to 1, and the farther outside it is, the more a tetrahedron's
     /// motion moves it.
     pub fn to_tetrahedra(tree: &VesselTree, mesh: &TetMesh) -> Self {
         at_once(Self::to_tetrahedra_paced(tree, mesh, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub async fn to_tetrahedra_paced(tree: &VesselTree, mesh: &TetMesh, pace: &Pace) -> Self {
         let mut binding = Self { bonds: Bonds::Solid(SolidBonds::new(mesh, &pace.part(0.0..0.3)).await) };
         binding.extend_paced(tree, &pace.part(0.3..1.0)).await;
         binding
     }
 
-    /// Binds the nodes that were appended to the tree since the last call. The tree is to be at rest, as its beginning
-    /// was. A tree with fewer nodes than are bound is taken for another one, and bound from the beginning.
+    /// Binds the nodes that were appended to the tree since the last call. The tree must be at rest, as before. A tree
+    /// with fewer nodes than are bound counts as another tree, and is bound from the beginning.
     pub fn extend(&mut self, tree: &VesselTree) {
         at_once(self.extend_paced(tree, &Pace::default()));
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub async fn extend_paced(&mut self, tree: &VesselTree, pace: &Pace) {
         let bound = if tree.len() < self.len() { 0 } else { self.len() };
         match &mut self.bonds {
@@ -149,11 +146,11 @@ impl Binding {
 
     /// Moves the nodes with the organ, whose vertices are now at `vertices`; `positions` has one entry per node.
     ///
-    /// Where a triangle has collapsed, its nodes lie on it and lose their offset. With the feature `parallel` many nodes
+    /// If a triangle has collapsed, its nodes lie on it and lose their offset. With the feature `parallel`, many nodes
     /// are shared among the threads of the pool, with the same result.
     ///
     /// # Errors
-    /// Another number of vertices or nodes than were bound, or a vertex that is not finite.
+    /// A number of vertices or nodes that differs from the bound ones, or a vertex that is not finite.
     pub fn follow_into(&mut self, vertices: &[Vec3], positions: &mut [Vec3]) -> Result<(), BindingError> {
         if vertices.len() != self.vertices() {
             return Err(BindingError::VertexCount { bound: self.vertices(), given: vertices.len() });
@@ -173,7 +170,7 @@ impl Binding {
 
     /// Moves the nodes of a tree with the organ: [`follow_into`](Self::follow_into) its positions.
     ///
-    /// The tree is to be a copy of the one at rest, where that still grows.
+    /// If the tree at rest still grows, pass a copy of it.
     ///
     /// # Errors
     /// Those of [`follow_into`](Self::follow_into).
@@ -181,12 +178,12 @@ impl Binding {
         self.follow_into(vertices, tree.positions_mut())
     }
 
-    /// The organ's normal at a node, as the organ was in the last call of a `follow`, or at rest before the first.
+    /// The organ's normal at a node, in the pose of the last `follow` call, or at rest before the first.
     ///
-    /// Unit length; `Vec3::ZERO` where the organ has collapsed, and for a node bound to tetrahedra.
+    /// Unit length; `Vec3::ZERO` if the organ has collapsed there, and for a node bound to tetrahedra.
     ///
     /// # Panics
-    /// When the node is not bound.
+    /// If the node is not bound.
     pub fn normal(&self, node: usize) -> Vec3 {
         match &self.bonds {
             Bonds::Surface(bonds) => bonds.normal(node),

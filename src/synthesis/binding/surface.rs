@@ -1,9 +1,8 @@
 //! Nodes bound to triangles.
 
 use super::{
-    WORTH_SHARING,
     frames::{Frames, LANES, Vectors},
-    vertices::{Vertex, Vertices},
+    vertices::{Vertex, Vertices, WORTH_SHARING},
 };
 use crate::synthesis::{
     mesh::{TriangleIndex, TriangleMesh, doubled_normal, unit},
@@ -13,8 +12,8 @@ use crate::synthesis::{
 use bevy_math::{Vec3, Vec3A, Vec4};
 use std::ops::Range;
 
-/// Length of an offset, relative to the size of the coordinates, below which a node lies on the surface: a few
-/// roundings. Such nodes need no frame.
+/// Length of an offset, relative to the size of the coordinates, below which a node lies on the surface: a few rounding
+/// errors. Such nodes need no frame.
 const ON_SURFACE: f32 = 1.0e-6;
 
 /// Squared length of the sum of three weighted unit normals below which they cancel out.
@@ -23,16 +22,16 @@ const CANCELLED: f32 = 1.0e-6;
 /// A node's place relative to a triangle.
 #[derive(Clone, Copy, Debug)]
 struct Bond {
-    /// The triangle's vertices, turned so that the edge from the first to the second is good for a frame.
+    /// The triangle's vertices, rotated so that the edge from the first to the second suits a frame.
     corners: [u32; 3],
-    /// Weights of the second and the third; the three sum to 1.
+    /// Weights of the second and the third; all three sum to 1.
     weights: [f32; 2],
     /// From the point with these weights to the node, in the frame there.
     offset: Vec3,
 }
 
 impl Bond {
-    /// The point of the triangle that the weights stand for.
+    /// The point of the triangle with these weights.
     #[inline]
     fn point(&self, vertices: &[Vertex]) -> Vec3A {
         let [a, b, c] = self.corners.map(|corner| vertices[corner as usize].position);
@@ -51,7 +50,7 @@ impl Bond {
         a * (1.0 - v - w) + b * v + c * w
     }
 
-    /// Unit normal of the triangle itself, zero where it has no area.
+    /// Unit normal of the triangle itself, zero if it has no area.
     #[cold]
     fn normal_of_triangle(&self, vertices: &[Vertex]) -> Vec3A {
         unit(doubled_normal(self.corners.map(|corner| vertices[corner as usize].position.into()))).into()
@@ -73,7 +72,7 @@ fn frames(bonds: &[Bond; LANES], vertices: &[Vertex], scale: f32) -> Frames {
     Frames::new(edges, bonds.each_ref().map(normal).into())
 }
 
-/// Where four nodes are.
+/// Positions of four nodes.
 #[inline]
 fn nodes(bonds: &[Bond; LANES], vertices: &[Vertex], scale: f32) -> [Vec3; LANES] {
     let points = bonds.each_ref().map(|bond| bond.point(vertices));
@@ -96,7 +95,7 @@ pub(super) struct SurfaceBonds {
     /// Brings coordinates at rest near 1.
     rest_scale: f32,
     bonds: Vec<Bond>,
-    /// As they were last followed.
+    /// The vertices of the last pose.
     vertices: Vec<Vertex>,
 }
 
@@ -154,7 +153,7 @@ impl SurfaceBonds {
     }
 }
 
-/// Binds a node to a triangle, at the point of it with three weights.
+/// Binds a node to a triangle, at its point with three weights.
 fn bond(vertices: &[Vertex], scale: f32, [a, b, c]: [u32; 3], weights: Vec3, node: Vec3) -> Bond {
     let turn = |corners, weights| Bond { corners, weights, offset: Vec3::ZERO };
     let turns = [
@@ -165,7 +164,7 @@ fn bond(vertices: &[Vertex], scale: f32, [a, b, c]: [u32; 3], weights: Vec3, nod
     let normal = <[Vec3A; LANES]>::from(frames(&[turns[0]; LANES], vertices, scale).up)[0];
     let across = |bond: &Bond| bond.edge(vertices).reject_from_normalized(normal).length_squared();
     let mut bond = turns.into_iter().max_by(|x, y| across(x).total_cmp(&across(y))).expect("there are three turns");
-    // Measured from the point that following begins from, so that its rounding cancels out.
+    // Measured from the same point from which positions are computed later, so that its rounding cancels out.
     let away = Vec3A::from(node) - bond.point(vertices);
     if away.length() > ON_SURFACE * node.abs().max_element() {
         let Frames { along, across, up } = frames(&[bond; LANES], vertices, scale);

@@ -1,6 +1,5 @@
 //! Nodes bound to tetrahedra.
 
-use super::WORTH_SHARING;
 use crate::synthesis::{
     mesh::{TetMesh, tet_mesh::edges, triangle_index::closest_on_triangle},
     pace::{Pace, SHORT_STRETCH},
@@ -10,7 +9,10 @@ use crate::synthesis::{
 use bevy_math::{DVec3, Vec3};
 use std::ops::Range;
 
-/// A point's weights for the last three corners of a tetrahedron; the four sum to 1.
+/// Fewest nodes worth handing to another thread.
+const WORTH_SHARING: usize = 2048;
+
+/// A point's weights for the last three corners of a tetrahedron; all four sum to 1.
 fn weights(point: Vec3, corners: [Vec3; 4]) -> DVec3 {
     edges(corners).inverse() * (point.as_dvec3() - corners[0].as_dvec3())
 }
@@ -30,7 +32,7 @@ fn distance_squared(point: Vec3, corners: [Vec3; 4]) -> f64 {
 #[derive(Clone, Copy, Debug)]
 struct Bond {
     corners: [u32; 4],
-    /// Weights of the last three corners; the four sum to 1.
+    /// Weights of the last three corners; all four sum to 1.
     weights: Vec3,
 }
 
@@ -96,7 +98,7 @@ impl SolidBonds {
 }
 
 impl Elements {
-    /// The first of the tetrahedra nearest to a point.
+    /// The tetrahedron nearest to a point; of equally near ones, the first.
     fn nearest(&self, point: Vec3) -> usize {
         let mut found = (f64::INFINITY, u32::MAX);
         self.tree.nearest(point, f32::INFINITY, |slot, best| {

@@ -1,34 +1,36 @@
-//! An organ's vertices as nodes follow them: each with the normal there, measured anew for every pose.
+//! An organ's vertices with normals, measured again for every pose.
 //!
 //! In: a [`TriangleMesh`], then positions of its vertices. Out: a [`Vertex`] for each. Normals are the mean over the
-//! triangles around a position, weighted by area, as in [`TriangleMesh::vertex_normals`]; here in f32 and gathered
-//! vertex by vertex, so that threads share the work and nothing depends on their number.
+//! triangles around a position, weighted by area, as in [`TriangleMesh::vertex_normals`]; here they are computed in f32
+//! and gathered vertex by vertex, so that threads share the work and the result doesn't depend on their number.
 
-use super::WORTH_SHARING;
 use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
 use crate::synthesis::{pace::Pace, parallel};
 use bevy_math::{Vec3, Vec3A};
 
-/// A vertex of a deformed organ. Position and normal lie side by side: a node asks for both, anywhere in the mesh.
+/// Fewest triangles, vertices, or groups of four nodes, worth handing to another thread.
+pub(super) const WORTH_SHARING: usize = 2048;
+
+/// A vertex of a deformed organ. Position and normal are stored together, since nodes read both at random vertices.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Vertex {
     pub position: Vec3A,
-    /// Unit length, or zero where the triangles around have no area or cancel out.
+    /// Unit length, or zero if the triangles around have no area or cancel out.
     pub normal: Vec3A,
 }
 
-/// What it takes to measure vertices, with room for what is measured on the way.
+/// Data for measuring vertices, with scratch space.
 #[derive(Clone, Debug)]
 pub(super) struct Vertices {
     triangles: Vec<[u32; 3]>,
     welding: Welding,
-    /// Of each welded vertex, where its triangles begin and end in `around`.
+    /// Range in `around` of each welded vertex's triangles.
     ranges: Vec<[u32; 2]>,
     /// The triangles around each welded vertex.
     around: Vec<u32>,
     /// Twice the area of each triangle, along its normal, in units that depend on the pose.
     areas: Vec<Vec3A>,
-    /// Of each welded vertex.
+    /// Normal of each welded vertex.
     normals: Vec<Vec3A>,
 }
 
@@ -63,10 +65,10 @@ impl Vertices {
         Self { triangles, welding, ranges, around, areas, normals }
     }
 
-    /// Measures all vertices at finite positions, of which there are as many as the mesh has. Returns the power of two
-    /// that brings their coordinates near 1.
+    /// Measures all vertices at finite positions, one for each vertex of the mesh. Returns the power of two that brings
+    /// their coordinates near 1.
     pub fn measure(&mut self, positions: &[Vec3], vertices: &mut Vec<Vertex>) -> f32 {
-        // Products stay within f32 at any size of the organ.
+        // The scale keeps products within f32 at any size of the organ.
         let scale = scale_to_one(positions);
         let area = |_, corners: &[u32; 3]| {
             let [a, b, c] = corners.map(|corner| Vec3A::from(positions[corner as usize]) * scale);
@@ -90,11 +92,11 @@ impl Vertices {
     }
 }
 
-/// A power of two by which the largest coordinate comes to between 1 and 4.
+/// A power of two that brings the largest coordinate to between 1 and 4.
 fn scale_to_one(positions: &[Vec3]) -> f32 {
     const EXPONENT: u32 = f32::INFINITY.to_bits();
     let largest = positions.iter().fold(Vec3::ZERO, |largest, position| largest.max(position.abs())).max_element();
-    // The exponent with its sign turned, kept from becoming that of 0 or of infinity.
+    // The negated exponent, kept from becoming that of 0 or of infinity.
     let inverse = (2 * 1.0f32.to_bits()).saturating_sub(largest.to_bits() & EXPONENT);
     f32::from_bits(inverse.clamp(f32::MIN_POSITIVE.to_bits(), f32::MAX.to_bits() & EXPONENT))
 }

@@ -1,7 +1,7 @@
 //! Candidates for drains: drawn from the tissue, block by block, so that threads can share the work.
 //!
-//! Every block of every step has its own stretch of the random stream. So what is drawn does not depend on who draws it, nor
-//! on when.
+//! Every block of every step has its own stretch of the random stream, so candidates don't depend on the thread or time
+//! of the draw.
 
 use super::vacancy::Vacancy;
 use crate::synthesis::parallel;
@@ -12,26 +12,26 @@ use bevy_math::{Vec3, bounding::Aabb3d};
 
 /// Most candidates in a block.
 const BLOCK: u32 = 1024;
-/// Bits of the stream's position that a block has to itself: a hundred numbers and more for each candidate.
+/// Bits of the stream's position within a block: more than a hundred numbers for each candidate.
 const STRETCH: u32 = 20;
-/// Bits of the stream's position for the blocks of a step: more than 2³² candidates need. The steps have the bits above.
+/// Bits of the stream's position for the blocks of a step: more than 2³² candidates need. Steps use the bits above.
 const BLOCKS: u32 = 22;
-/// Fewest candidates that are looked at in the order in which they lie in space.
+/// Fewest candidates that are tested in spatial order.
 const WORTH_SORTING: usize = 8192;
 
-/// Draws candidates from the tissue. Keeps its buffers.
+/// Draws candidates from the tissue. Reuses its buffers.
 #[derive(Debug)]
 pub(crate) struct Draws {
     /// The random stream, at its beginning.
     rng: VesselRng,
-    /// As many as any step needed; those beyond what the present one needs are empty.
+    /// As many as any step needed; surplus ones are empty.
     blocks: Vec<Vec<Vec3>>,
-    /// The step that the blocks are of, 0 for none, and whether its candidates were chosen by what was vacant.
+    /// The step of the blocks, 0 for none, and whether its candidates were drawn from vacant pieces.
     drawn: (u32, bool),
 }
 
 impl Draws {
-    /// Those of an organ's seed.
+    /// The draws of an organ's seed.
     pub fn new(seed: u64) -> Self {
         Self { rng: Stream::Attraction.rng(seed), blocks: Vec::new(), drawn: (0, false) }
     }
@@ -42,7 +42,7 @@ impl Draws {
         self.drawn = (0, false);
     }
 
-    /// Draws `count` candidates of a step, from what is vacant if that is known, unless it has been done before.
+    /// Draws `count` candidates of a step, from vacant pieces if those are known, unless they have been drawn before.
     pub fn draw(&mut self, tissue: &dyn Tissue, vacancy: Option<&Vacancy>, step: u32, count: u32) {
         if self.drawn == (step, vacancy.is_some()) {
             return;
@@ -69,20 +69,20 @@ impl Draws {
     }
 }
 
-/// The candidates of a step, less those that are refused. Keeps its buffers.
+/// The candidates of a step, less the refused ones. Reuses its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Candidates {
-    /// All that were drawn, in the order in which they were, and which of them were refused.
+    /// All drawn candidates, in the order of drawing, and which of them were refused.
     drawn: Vec<Vec3>,
     refused: Vec<bool>,
     order: SpatialOrder,
-    /// Both in the order in which candidates lie in space.
+    /// Both in spatial order.
     sorted: Vec<Vec3>,
     marks: Vec<bool>,
 }
 
 impl Candidates {
-    /// Takes what has been drawn within a box, less those that `refuse` marks.
+    /// Takes the drawn candidates, which lie within a box, less those that `refuse` marks.
     pub fn take(&mut self, draws: &Draws, bounds: &Aabb3d, refuse: impl Fn(&[Vec3], &mut [bool]) + Sync) {
         self.drawn.clear();
         draws.blocks.iter().for_each(|block| self.drawn.extend_from_slice(block));
@@ -91,7 +91,7 @@ impl Candidates {
         if self.drawn.len() < WORTH_SORTING {
             parallel::zip_chunks(&self.drawn, &mut self.refused, refuse);
         } else {
-            // Neighbours ask for the same memory.
+            // Neighbours use the same memory.
             self.order.sort(bounds, &self.drawn);
             let Self { drawn, refused, order, sorted, marks, .. } = self;
             sorted.clear();
@@ -105,7 +105,7 @@ impl Candidates {
         }
     }
 
-    /// Those candidates that are left, in the order in which they were drawn.
+    /// The remaining candidates, in the order of drawing.
     pub fn iter(&self) -> impl Iterator<Item = Vec3> + '_ {
         self.drawn.iter().zip(&self.refused).filter(|&(_, &refused)| !refused).map(|(&candidate, _)| candidate)
     }

@@ -1,4 +1,5 @@
-//! Where a node grows to: along, sideways, or in two (Rauch & Harders 2021, Eq. 4 and "symmetric bifurcations").
+//! The growth direction of a node: extend, sprout, or bifurcate (Rauch & Harders 2021, Eq. 4 and "symmetric
+//! bifurcations").
 
 use super::forest::Forest;
 use super::lengths::Lengths;
@@ -6,18 +7,18 @@ use super::settings::AngleSpread;
 use bevy_math::{Quat, Vec3, ops};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-/// What a node decided to do.
+/// A node's decision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Decision {
     /// One new segment in this unit direction.
     Extend(Vec3),
     /// Two new segments in these unit directions.
     Bifurcate([Vec3; 2]),
-    /// Nothing: the drains pull in no direction.
+    /// Nothing: the drains' pulls cancel out.
     Rest,
 }
 
-/// Decides for a node that hears the given drains.
+/// Decides for a node with the given acting drains.
 pub(crate) fn decide(
     forest: &Forest,
     lengths: &Lengths,
@@ -48,12 +49,13 @@ pub(crate) fn decide(
     Decision::Extend(growth)
 }
 
-/// Eq. 4: the weighted mean of the perception direction and the direction to the drains. The latter alone where they cancel.
+/// Eq. 4: the weighted mean of the perception direction and the direction to the drains. If they cancel out, the latter
+/// alone.
 fn mix(perception: Vec3, mean: Vec3, weight: f32) -> Vec3 {
     (perception * weight + mean * (1.0 - weight)).try_normalize().unwrap_or(mean)
 }
 
-/// Turns a unit vector by `angle` within the plane it spans with `target`, towards it. Any plane where they are parallel.
+/// Turns a unit vector by `angle` towards `target`, in the plane of both; in any plane if they are parallel.
 fn turn_toward(direction: Vec3, target: Vec3, angle: f32) -> Vec3 {
     let axis = direction.cross(target).try_normalize().unwrap_or_else(|| direction.any_orthonormal_vector());
     rotate(direction, axis, angle)
@@ -91,7 +93,7 @@ fn bifurcate(
 ) -> [Vec3; 2] {
     let center = drains.clone().sum::<Vec3>() / drains.len() as f32;
     let line = principal_line(center, drains);
-    // Where node, centre and line are in a row every plane holds them.
+    // If node, centre and line are collinear, any plane contains them.
     let normal = (center - position).cross(line).try_normalize().unwrap_or_else(|| growth.any_orthonormal_vector());
     let in_plane = growth.reject_from_normalized(normal).try_normalize().unwrap_or(growth);
     let axis =
@@ -100,7 +102,7 @@ fn bifurcate(
 }
 
 /// Direction of the line through `center` with the least squared distances to the points: the eigenvector of their
-/// covariance with the largest eigenvalue. Its sign is fixed, so that the daughters' order is.
+/// covariance with the largest eigenvalue. Its sign is fixed, so that the daughters' order is, too.
 fn principal_line(center: Vec3, points: impl Iterator<Item = Vec3> + Clone) -> Vec3 {
     // Relative to their extent, so that the covariance neither over- nor underflows.
     let extent = points.clone().map(|point| (point - center).abs().max_element()).fold(0.0, f32::max);
@@ -141,7 +143,7 @@ mod tests {
         let [a, b] = bifurcate(Vec3::ZERO, Vec3::new(0.8, 0.1, 0.3).normalize(), drains.into_iter(), half);
         assert!((a.angle_between(b) - 2.0 * half).abs() < 1e-4);
         assert!(a.z.abs() < 1e-5 && b.z.abs() < 1e-5);
-        // Drains in a row with the node: any plane, but the angle holds.
+        // Drains collinear with the node: any plane, but the same angle.
         let row = [Vec3::X, Vec3::X * 2.0];
         let [a, b] = bifurcate(Vec3::ZERO, Vec3::X, row.into_iter(), half);
         assert!((a.angle_between(b) - 2.0 * half).abs() < 1e-4 && a.is_finite());

@@ -1,30 +1,30 @@
 //! Attraction points: oxygen drains for the arteries, carbon-dioxide sources for the veins.
 //!
-//! A drain is born in tissue that no vessel supplies, acts on its nearest open node, and leaves once it is supplied. It
-//! keeps that node between steps and is told of what happens to it, so that a step costs as much as happens in it, however
-//! many drains wait:
+//! A drain is born in unsupplied tissue, acts on its nearest open node, and is removed once it is supplied. It stores
+//! that node between steps and is notified of changes, so the cost of a step depends on its changes, not on the number
+//! of waiting drains:
 //!
-//! - a new node [makes itself known](News) to the drains within reach, and may become their nearest;
-//! - a node that closes, or hears in another way than before, [wakes](Drains::wake) the drains that wait at it;
-//! - all other drains sleep. Asked again, they would answer as they did before.
+//! - a new node [notifies](News) the drains within reach, and may become their nearest;
+//! - a node that closes, or whose perception changes, [wakes](Drains::wake) the drains that wait at it;
+//! - all other drains sleep. A test of them would give the same result as before.
 
 use crate::synthesis::parallel;
 use crate::synthesis::space::point_grid::PointGrid;
 use bevy_math::{Vec3, bounding::Aabb3d};
 
-/// What stands for no node and no drain.
+/// No node or drain.
 const NONE: u32 = u32::MAX;
 
-/// What a drain knows of the vessels around it.
+/// A drain's knowledge of the vessels around it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hearing {
-    /// Its nearest open node, as of when it was last looked for; [`NONE`] for no node within reach.
+    /// Its nearest open node as of the last search; [`NONE`] for no node within reach.
     node: u32,
     /// Squared distance to that node, infinite without one.
     pub distance: f32,
     /// Squared distance to the nearest node of any kind within reach, infinite without one.
     pub closest: f32,
-    /// Cosine of the angle between the node's direction and the way from it to the drain.
+    /// Cosine of the angle between the node's direction and the direction from it to the drain.
     pub cos: f32,
     /// The drains that wait at the same node, before and after this one.
     before: u32,
@@ -35,26 +35,26 @@ impl Hearing {
     const NOBODY: Self =
         Self { node: NONE, distance: f32::INFINITY, closest: f32::INFINITY, cos: 1.0, before: NONE, after: NONE };
 
-    /// The nearest open node, as far as is known.
+    /// The nearest known open node.
     pub fn node(&self) -> Option<u32> {
         (self.node != NONE).then_some(self.node)
     }
 }
 
-/// How a drain is doing.
+/// The state of a drain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     /// The slot is free.
     Gone,
-    /// Nothing has happened since the drain was found not to act.
+    /// Nothing has changed since the drain was found not to act.
     Asleep,
-    /// To be asked in the next step.
+    /// To be tested in the next step.
     Awake,
-    /// To look for its nearest open node in the next step.
+    /// To search its nearest open node in the next step.
     Searching,
 }
 
-/// A node that a drain found to be its nearest open one.
+/// The result of a drain's search for its nearest open node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Found {
     /// The node, if there is one within reach.
@@ -63,11 +63,11 @@ pub(crate) struct Found {
     pub distance: f32,
     /// Squared distance to the nearest node of any kind, infinite without one.
     pub closest: f32,
-    /// Cosine of the angle between the node's direction and the way to the drain.
+    /// Cosine of the angle between the node's direction and the direction to the drain.
     pub cos: f32,
 }
 
-/// A new node that a drain has to know of.
+/// A new node that a drain must know.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Heard {
     pub node: u32,
@@ -76,18 +76,18 @@ pub(crate) struct Heard {
     pub distance: f32,
 }
 
-/// New nodes whose drains one thread looks for at a time.
+/// New nodes for whose drains one thread searches at a time.
 const NODES_PER_SHARE: usize = 256;
 
-/// Which drains hear of new nodes. Keeps its buffers.
+/// Notifications of drains about new nodes. Reuses its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct News {
-    /// What is heard, by share of the nodes.
+    /// Notifications, by share of the nodes.
     shares: Vec<Vec<Heard>>,
 }
 
 impl News {
-    /// Finds for each of some nodes, which are numbered from `first` on, the drains within `reach` to which it is news.
+    /// Finds for each of some nodes, numbered from `first` on, the drains within `reach` that it matters to.
     pub fn spread(&mut self, drains: &Drains, first: u32, positions: &[Vec3], reach: f32) {
         let count = positions.len().div_ceil(NODES_PER_SHARE);
         if self.shares.len() < count {
@@ -108,7 +108,7 @@ impl News {
         });
     }
 
-    /// What is heard, by the number of the nodes.
+    /// The notifications, in the order of the nodes.
     pub fn iter(&self) -> impl Iterator<Item = Heard> + '_ {
         self.shares.iter().flatten().copied()
     }
@@ -122,9 +122,9 @@ pub(crate) struct Drains {
     states: Vec<State>,
     /// First drain that waits at each node.
     waiting: Vec<u32>,
-    /// Drains to be asked in the next step, in no order.
+    /// Drains to be tested in the next step, in no order.
     awake: Vec<u32>,
-    /// Slots of drains that left, to be used again.
+    /// Slots of removed drains, for reuse.
     free: Vec<u32>,
 }
 
@@ -139,7 +139,7 @@ impl Drains {
         self.free.clear();
     }
 
-    /// Follows lengths that have changed: finer cells for shorter ones.
+    /// Adapts the cells to changed lengths: finer cells for shorter ones.
     pub fn resize_cells(&mut self, cell: f32) {
         self.grid.resize_cells(cell);
     }
@@ -149,7 +149,7 @@ impl Drains {
         self.states.len() - self.free.len()
     }
 
-    /// Adds a drain that is to look for a node, and gives its slot.
+    /// Adds a drain that must search its node, and returns its slot.
     pub fn add(&mut self, position: Vec3) -> u32 {
         let slot = if let Some(slot) = self.free.pop() {
             self.grid.replace(slot, position);
@@ -169,12 +169,12 @@ impl Drains {
     pub fn remove(&mut self, slot: u32) {
         self.grid.remove(slot);
         self.detach(slot);
-        // It may be in the list of those awake, which then lets go of it.
+        // It may be in the list of awake drains, which drops it later.
         self.states[slot as usize] = State::Gone;
         self.free.push(slot);
     }
 
-    /// Where a drain is.
+    /// Position of a drain.
     pub fn position(&self, slot: u32) -> Vec3 {
         self.grid.point(slot)
     }
@@ -195,22 +195,22 @@ impl Drains {
         &self.grid
     }
 
-    /// What a drain knows.
+    /// A drain's knowledge.
     pub fn hearing(&self, slot: u32) -> &Hearing {
         &self.hearing[slot as usize]
     }
 
-    /// Drains to be asked in this step, in no order that means anything.
+    /// Drains to be tested in this step, in no particular order.
     pub fn awake(&self) -> &[u32] {
         &self.awake
     }
 
-    /// Whether a drain must look for its nearest open node.
+    /// Whether a drain must search its nearest open node.
     pub fn is_searching(&self, slot: u32) -> bool {
         self.states[slot as usize] == State::Searching
     }
 
-    /// Tells a drain what it found when it looked for its nearest open node.
+    /// Stores the result of a drain's search for its nearest open node.
     pub fn settle(&mut self, slot: u32, found: Found) {
         self.detach(slot);
         let own = &mut self.hearing[slot as usize];
@@ -221,7 +221,7 @@ impl Drains {
         }
     }
 
-    /// Keeps those drains awake that `acts` is true for, and lets the others sleep.
+    /// Keeps the drains awake for which `acts` is true, and lets the others sleep.
     pub fn keep_awake(&mut self, mut acts: impl FnMut(u32, &Hearing) -> bool) {
         let (hearing, states) = (&self.hearing, &mut self.states);
         self.awake.retain(|&slot| {
@@ -233,14 +233,13 @@ impl Drains {
         });
     }
 
-    /// Lets go of drains that left while they were awake.
+    /// Drops drains that were removed while they were awake.
     pub fn forget_the_gone(&mut self) {
         let states = &self.states;
         self.awake.retain(|&slot| states[slot as usize] != State::Gone);
     }
 
-    /// Wakes the drains that wait at a node, since it hears in another way than before. If it has `closed`, they look for
-    /// another one.
+    /// Wakes the drains that wait at a node, since its perception changed. If it has `closed`, they search another one.
     pub fn wake(&mut self, node: u32, closed: bool) {
         let mut slot = self.waiting.get(node as usize).copied().unwrap_or(NONE);
         while slot != NONE {
@@ -257,7 +256,7 @@ impl Drains {
         }
     }
 
-    /// Lets every drain look anew, for when reaches have grown.
+    /// Makes every drain search again, after reaches have grown.
     pub fn wake_all(&mut self) {
         for (slot, state) in self.states.iter_mut().enumerate() {
             if *state == State::Asleep {
@@ -269,8 +268,8 @@ impl Drains {
         }
     }
 
-    /// Lets a drain know of a new open node with a segment in the given `direction`. Of two nodes at one distance the older
-    /// stays.
+    /// Notifies a drain of a new open node with a segment in the given `direction`. Of two nodes at equal distance, the
+    /// older stays.
     pub fn hear(&mut self, heard: Heard, position: Vec3, direction: Vec3) {
         let Heard { node, drain: slot, distance } = heard;
         let own = &mut self.hearing[slot as usize];
@@ -287,7 +286,7 @@ impl Drains {
         }
     }
 
-    /// Puts a drain first in the list of those that wait at a node.
+    /// Puts a drain first in the list of drains that wait at a node.
     fn attach(&mut self, slot: u32, node: u32, distance: f32, cos: f32) {
         let Self { hearing, waiting, .. } = self;
         if node as usize >= waiting.len() {
@@ -301,7 +300,7 @@ impl Drains {
         *own = Hearing { node, distance, cos, before: NONE, after, closest: own.closest };
     }
 
-    /// Takes a drain out of the list that it is in, if any.
+    /// Removes a drain from its list, if any.
     fn detach(&mut self, slot: u32) {
         let Hearing { node, before, after, .. } = self.hearing[slot as usize];
         if node == NONE {
@@ -318,10 +317,10 @@ impl Drains {
     }
 }
 
-/// What stands for the cosine of a drain on the node itself, which is in front of it as much as anywhere.
+/// The cosine of a drain on the node itself, which counts as in front of it.
 pub(crate) const ON_THE_NODE: f32 = 2.0;
 
-/// Cosine of the angle between a direction and the way from a node to a drain.
+/// Cosine of the angle between a direction and the direction from a node to a drain.
 pub(crate) fn cos_at(direction: Vec3, node: Vec3, drain: Vec3) -> f32 {
     (drain - node).try_normalize().map_or(ON_THE_NODE, |toward| direction.dot(toward).clamp(-1.0, 1.0))
 }

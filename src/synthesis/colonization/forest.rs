@@ -1,4 +1,4 @@
-//! The forest of one system while it grows: the tree, and what growth needs to know of each node beside it.
+//! The forest of one system while it grows: the tree, with further data of each node for growth.
 
 use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::tissue::TissuePoint;
@@ -8,9 +8,9 @@ use bevy_math::{Vec3, bounding::Aabb3d, ops};
 
 /// A growing forest. All vectors have one entry per node.
 ///
-/// Of a node's radius growth itself needs the *sum*, r^κ in units of the full terminal radius: a tip's own, elsewhere that
-/// of its children. Sums are right after every step; the radii in the tree only after [`settle`](Self::settle), since a
-/// power for every changed node and step would be most of the work.
+/// Instead of radii, growth uses the *sum* of a node, r^κ in units of the full terminal radius: a tip's own, elsewhere
+/// that of its children. Sums are up to date after every step, but the radii in the tree only after
+/// [`settle`](Self::settle), since a power for every changed node and step would be most of the work.
 #[derive(Debug, Default)]
 pub(crate) struct Forest {
     pub tree: VesselTree,
@@ -18,12 +18,12 @@ pub(crate) struct Forest {
     pub directions: Vec<Vec3>,
     /// Normal of the tissue's surface, zero in a volume.
     pub normals: Vec<Vec3>,
-    /// Step in which the node was born, 0 for what was there at the start.
+    /// Step in which the node was born, 0 for initial nodes.
     pub birth_steps: Vec<u32>,
     kin: Vec<Kin>,
     fanouts: Vec<Fanout>,
     index: PointGrid,
-    /// Nodes whose sum must be added up again.
+    /// Nodes whose sum must be computed again.
     unsummed: NodeSet,
     /// Nodes whose sum changed since the radii were last settled.
     unsettled: NodeSet,
@@ -43,7 +43,7 @@ struct Kin {
     next_sibling: u32,
 }
 
-/// What stands for no child.
+/// No child.
 const NONE: u32 = u32::MAX;
 
 /// Number of a node's children, and whether it is a root.
@@ -77,31 +77,31 @@ impl Forest {
         &self.index
     }
 
-    /// Follows lengths that have changed: finer cells for shorter ones.
+    /// Adapts the cells to changed lengths: finer cells for shorter ones.
     pub fn resize_cells(&mut self, cell: f32) {
         self.index.resize_cells(cell);
     }
 
-    /// Sets the radius of the tips that are born from now on.
+    /// Sets the radius of tips born from now on.
     pub fn set_tip_radius(&mut self, radius: f32) {
         if radius != self.tip.0 {
             self.tip = (radius, self.sum_of(radius));
         }
     }
 
-    /// Adds a root whose vessel would be of the given radius if it were a tip.
+    /// Adds a root, with the given radius if it were a tip.
     pub fn add_root(&mut self, at: TissuePoint, radius: f32) {
         self.tree.push_root(at.position, radius);
         self.add_channels(at, Vec3::ZERO, self.sum_of(radius), 0);
         self.fanouts.push(Fanout(Fanout::ROOT));
     }
 
-    /// Adds a tip of a given radius to a node that was there at the start.
+    /// Adds a tip of a given radius to an initial node.
     pub fn add_given(&mut self, parent: u32, at: TissuePoint, radius: f32) {
         self.add_child(parent, at, radius, self.sum_of(radius), 0);
     }
 
-    /// Adds a tip to a node. The sums towards the root follow with the next [`sum_up`](Self::sum_up).
+    /// Adds a tip to a node. The next [`sum_up`](Self::sum_up) updates the sums towards the root.
     pub fn add_tip(&mut self, parent: u32, at: TissuePoint, step: u32) {
         let (radius, sum) = self.tip;
         self.add_child(parent, at, radius, sum, step);
@@ -135,7 +135,7 @@ impl Forest {
         if radius == self.terminal_radius { 1.0 } else { ops::powf(radius / self.terminal_radius, self.exponent) }
     }
 
-    /// Number of children of a node; 32,767 where there are more.
+    /// Number of children of a node, at most 32,767.
     pub fn children(&self, node: u32) -> u32 {
         u32::from(self.fanouts[node as usize].0 & !Fanout::ROOT)
     }
@@ -147,16 +147,15 @@ impl Forest {
 
     /// Angle at which a new tip leaves an inter-node beside its only child, in radians.
     pub fn sprout_angle(&self, node: u32) -> f32 {
-        // With one child the sum at the node is the child's.
+        // With one child, the sum at the node is the child's.
         murray::sprout_angle(self.kin[node as usize].sum / self.tip.1, self.exponent)
     }
 
-    /// Adds up the sums of all nodes that new tips changed, from the tips to the roots. `changed` is told each of them that
-    /// was there before.
+    /// Computes the sums of all nodes that new tips changed, from the tips to the roots. `changed` is called for each
+    /// old node among them.
     ///
-    /// A node's sum is always added up afresh, from its youngest child to its oldest, so that it is the same whatever
-    /// happened on the way. Children stand behind their parents: one descent through the set meets every node after its
-    /// children.
+    /// A node's sum is always computed from scratch, from its youngest child to its oldest, so it doesn't depend on the
+    /// history. Children come after their parents: one descent through the set meets every node after its children.
     pub fn sum_up(&mut self, mut changed: impl FnMut(u32)) {
         while let Some(node) = self.unsummed.pop_last() {
             let sum = self.children_of(node).map(|child| self.kin[child as usize].sum).sum();
@@ -179,7 +178,8 @@ impl Forest {
         std::iter::successors(link(self.kin[node as usize].first_child), next)
     }
 
-    /// Renews by Murray's law the radii of all nodes whose sum changed since the last time, from the tips to the roots.
+    /// Computes by Murray's law the radii of all nodes whose sum changed since the last time, from the tips to the
+    /// roots.
     pub fn settle(&mut self) {
         self.changed.clear();
         let inverse_exponent = self.exponent.recip();
@@ -198,7 +198,8 @@ impl Forest {
     }
 }
 
-/// A set of nodes that gives them back from the last to the first. Members may be added on the way, below the last one taken.
+/// A set of nodes that returns them from the last to the first. Members may be added meanwhile, below the last one
+/// taken.
 #[derive(Debug, Default)]
 struct NodeSet {
     words: Vec<u64>,

@@ -1,4 +1,4 @@
-//! The settings of one system as a step uses them: lengths multiplied by λ_t, angles in radians and cosines.
+//! The settings of one system in the form used by a step: lengths multiplied by λ_t, angles in radians and cosines.
 
 use super::settings::{AngleSpread, SystemSettings};
 use crate::synthesis::tissue::TissueGrowth;
@@ -18,7 +18,7 @@ pub(crate) struct Lengths {
     pub direction_weight: f32,
     /// γ/2 in radians.
     pub half_perception: f32,
-    /// cos γ/2, or below −1 where everything is seen.
+    /// cos γ/2, or below −1 if everything is perceived.
     pub cos_half_perception: f32,
     pub bifurcation_threshold: f32,
     pub angle_spread: AngleSpread,
@@ -26,12 +26,12 @@ pub(crate) struct Lengths {
     pub half_bifurcation: f32,
     pub lateral_sprouts: bool,
     pub root_children: u32,
-    /// Whether the angle of sprouts beside a vessel changes from step to step although the vessel does not.
+    /// Whether the angle of sprouts beside a vessel changes between steps even if the vessel does not.
     pub sprouts_turn: bool,
 }
 
 impl Lengths {
-    /// At tissue size σ_t, the size at the start being 1: λ_t = 1/σ_t.
+    /// The lengths at tissue size σ_t, relative to the start: λ_t = 1/σ_t.
     pub fn at_size(settings: &SystemSettings, size: f32) -> Self {
         let scale = size.recip();
         let half_perception = (0.5 * settings.perception_angle).to_radians();
@@ -54,13 +54,13 @@ impl Lengths {
         }
     }
 
-    /// How far a node can matter to a drain: to be heard, or to supply it.
+    /// Largest distance at which a node matters to a drain, which acts on it or is supplied by it.
     pub fn reach(&self) -> f32 {
         self.influence.max(self.kill)
     }
 
-    /// Side of the cells of the index over nodes: a little more than what is asked for most. Empty cells cost nothing, and
-    /// in a cell of this size there is about one node.
+    /// Side of the cells of the index over nodes: a little more than the most frequent query distance. Empty cells cost
+    /// nothing, and a cell of this size has about one node.
     pub fn node_cell(&self) -> f32 {
         CELL * self.node_birth.max(self.kill).max(0.25 * self.influence)
     }
@@ -71,6 +71,6 @@ impl Lengths {
     }
 }
 
-/// Side of a cell in distances that are asked for most: a little more than two, so that a ball of that radius meets no more
-/// than two cells along each axis.
+/// Side of a cell relative to the most frequent query distance: a little more than two, so that a ball of that radius
+/// meets at most two cells along each axis.
 const CELL: f32 = 2.01;

@@ -4,10 +4,10 @@
 //! little larger after each [`Colonization::step`]. Source: Rauch & Harders, "Interactive Synthesis of 3D Geometries of Blood
 //! Vessels", Eurographics 2021 (short papers), section 3.
 //!
-//! A step samples the tissue for new oxygen drains, grows the arteries towards them, hands the drains that are now
-//! supplied to the venous system as carbon-dioxide sources, grows the veins towards those, and lets the tissue grow.
+//! A step samples the tissue for new oxygen drains, grows the arteries towards them, hands the supplied drains to the
+//! venous system as carbon-dioxide sources, grows the veins towards those, and lets the tissue grow.
 //!
-//! What a step does depends on the settings and the seed alone: not on time, frames or the number of threads.
+//! A step depends on the settings and the seed alone, not on time, frames or the number of threads.
 
 mod candidates;
 mod direction;
@@ -15,6 +15,7 @@ mod drains;
 mod forest;
 mod lengths;
 mod perception;
+mod report;
 pub mod seam;
 mod settings;
 mod step;
@@ -24,6 +25,7 @@ mod tests;
 mod vacancy;
 mod validity;
 
+pub use report::{StepReport, SystemReport};
 pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWarning, SystemSettings};
 
 use crate::synthesis::parallel;
@@ -37,35 +39,7 @@ use step::Step;
 use system_growth::{Supplied, SystemGrowth};
 use vacancy::Vacancy;
 
-/// What one step did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StepReport {
-    /// Number of the step, from 1.
-    pub step: u32,
-    /// Candidates drawn from the tissue.
-    pub sampled: u32,
-    /// Candidates that became oxygen drains.
-    pub born: u32,
-    /// What the arteries did.
-    pub arterial: SystemReport,
-    /// What the veins did.
-    pub venous: SystemReport,
-}
-
-/// What one step did to one system.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SystemReport {
-    /// Nodes before the step: the first new node's index.
-    pub first_new_node: u32,
-    /// Nodes that were added.
-    pub new_nodes: u32,
-    /// Drains that were supplied and removed.
-    pub supplied: u32,
-    /// Drains that are left.
-    pub drains_left: u32,
-}
-
-/// Why growth could not start.
+/// The reason why growth could not start.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ColonizationError {
     /// A setting outside its limits.
@@ -74,7 +48,7 @@ pub enum ColonizationError {
     /// Roots that do not fit the tissue.
     #[error(transparent)]
     Roots(#[from] RootError),
-    /// The arteries have no root to grow from, and the veins follow the arteries.
+    /// The arteries have no root, and the veins follow the arteries.
     #[error("the arterial system has no root; place at least one, or give it a tree to grow from")]
     NoArterialRoot,
 }
@@ -89,12 +63,12 @@ pub struct Colonization {
     settings: ColonizationSettings,
     systems: [SystemGrowth; 2],
     step: u32,
-    /// Steps in a row, up to the last one, that brought nothing.
+    /// Number of last steps in a row without growth.
     idle: u32,
     draws: Draws,
     candidates: Candidates,
     vacancy: Vacancy,
-    /// Drains on their way from the arteries to the veins.
+    /// Drains to be handed from the arteries to the veins.
     handed: Vec<Supplied>,
     links: Vec<BedLink>,
 }
@@ -106,7 +80,7 @@ impl Colonization {
     /// Prepares a growth. Lengths in the settings are the tissue's: see [`ColonizationSettings::fit`].
     ///
     /// # Errors
-    /// A setting outside its limits, roots that are not finite or lie too far from the tissue, or no arterial root.
+    /// A setting outside its limits, roots that are not finite or too far from the tissue, or no arterial root.
     pub fn new(
         tissue: Arc<dyn Tissue>,
         settings: ColonizationSettings,
@@ -137,7 +111,7 @@ impl Colonization {
     /// Starts again on the same tissue with other settings, roots or seed, keeping all memory.
     ///
     /// # Errors
-    /// As [`new`](Self::new); the growth is then as it was.
+    /// As [`new`](Self::new); the growth is unchanged then.
     pub fn restart(
         &mut self,
         settings: ColonizationSettings,
@@ -190,8 +164,8 @@ impl Colonization {
         report
     }
 
-    /// As [`step`](Self::step), but leaves the radii as they were until the next [`settle`](Self::settle): for several steps
-    /// in a row that nobody looks at in between. New nodes have the radius of a tip until then.
+    /// As [`step`](Self::step), but does not update the radii until the next [`settle`](Self::settle): for several
+    /// steps in a row whose trees are not read in between. New nodes have the radius of a tip until then.
     pub fn advance(&mut self) -> StepReport {
         if self.is_finished() {
             return StepReport { step: self.step, ..StepReport::default() };
@@ -207,15 +181,15 @@ impl Colonization {
         StepReport { step: step.number, sampled: self.settings.samples, born, arterial, venous }
     }
 
-    /// Renews by Murray's law all radii that the steps since the last settling changed.
+    /// Computes by Murray's law all radii that the steps since the last settling changed.
     pub fn settle(&mut self) {
         self.systems.iter_mut().for_each(|system| system.forest.settle());
     }
 
-    /// Takes all steps that are left.
+    /// Does all remaining steps.
     ///
-    /// Arteries never look at veins. So while the veins grow towards what the arteries supplied in one step, the arteries
-    /// take the next one, on another thread if there is one.
+    /// Arteries don't depend on veins. So while the veins grow towards the drains that the arteries supplied in one
+    /// step, the arteries do the next step, on another thread if there is one.
     pub fn run(&mut self) {
         let (tissue, settings) = (self.tissue.as_ref(), &self.settings);
         let at = |number: u32| Step { tissue, settings, number };
@@ -223,23 +197,23 @@ impl Colonization {
         let ([arteries, veins], handed, links) = (&mut self.systems, &mut self.handed, &mut self.links);
         let (done, idle) = (&mut self.step, &mut self.idle);
         parallel::with_company(|| {
-            // The step that the veins have not taken yet, and whether the arteries did something in it.
+            // The step that the veins have not done yet, and whether the arteries did something in it.
             let (mut waiting, mut acted) = (None, true);
             let mut grow_veins = |handed: &[Supplied], waiting: Option<u32>| {
                 waiting.is_some_and(|number| at(number).grow_veins(veins, handed, links).new_nodes > 0)
             };
             while !is_over(*done, *idle, settings) {
                 if !acted {
-                    // It depends on the veins whether there is a next step.
+                    // Whether there is a next step depends on the veins.
                     let grown = grow_veins(handed, waiting.take());
                     *idle = at(*done).idle_after(*idle, grown);
                     acted = true;
                     continue;
                 }
                 let step = at(*done + 1);
-                // All threads look at candidates, since the rest of the arteries' step has little to share.
+                // All threads test candidates, since the rest of the arteries' step has little work to share.
                 step.choose_candidates(draws, candidates, vacancy, arteries);
-                // The next ones are drawn ahead, unless it matters what this step comes to.
+                // The next ones are drawn ahead, unless they depend on this step's result.
                 let ahead = vacancy.chosen().is_none() && step.number < settings.steps;
                 let beside = || {
                     grow_veins(handed, waiting);
@@ -265,12 +239,12 @@ impl Colonization {
         self.settle();
     }
 
-    /// Whether all steps have been taken, or [`idle_steps`](ColonizationSettings::idle_steps) that brought nothing.
+    /// Whether all steps are done, or [`idle_steps`](ColonizationSettings::idle_steps) in a row without growth.
     pub fn is_finished(&self) -> bool {
         is_over(self.step, self.idle, &self.settings)
     }
 
-    /// Number of steps taken.
+    /// Number of steps done.
     pub fn steps_done(&self) -> u32 {
         self.step
     }
@@ -280,7 +254,7 @@ impl Colonization {
         &self.settings
     }
 
-    /// The tissue that is grown into.
+    /// The tissue of the growth.
     pub fn tissue(&self) -> &Arc<dyn Tissue> {
         &self.tissue
     }
@@ -296,7 +270,7 @@ impl Colonization {
         self.system(kind).map_or(&[], |system| &system.forest.normals)
     }
 
-    /// The step in which each node was born, 0 for those that growth began with.
+    /// The step in which each node was born, 0 for initial nodes.
     pub fn birth_steps(&self, kind: VesselKind) -> &[u32] {
         self.system(kind).map_or(&[], |system| &system.forest.birth_steps)
     }
@@ -317,27 +291,27 @@ impl Colonization {
         self.system(kind).map_or(0, |system| system.drains.len())
     }
 
-    /// λ_t of a kind: what its lengths are multiplied by at the present size of the tissue.
+    /// λ_t of a kind: the factor of its lengths at the present size of the tissue.
     pub fn length_scale(&self, kind: VesselKind) -> f32 {
         self.system(kind).map_or(1.0, SystemGrowth::length_scale)
     }
 
-    /// Where blood comes over from the arteries to the veins: for each drain that both have supplied, the node of either
-    /// that did. Through these the two trees are one circulation
+    /// Links through which blood flows from the arteries to the veins: for each drain that both have supplied, the two
+    /// nodes that did. They join the two trees to one circulation
     /// ([`Circulation`](crate::synthesis::haemodynamics::Circulation)).
     pub fn bed_links(&self) -> &[BedLink] {
         &self.links
     }
 
-    /// Where a node is drawn: lifted off the surface by its radius where the settings say so.
+    /// The position at which a node is drawn: lifted off the surface by its radius if the settings say so.
     ///
     /// # Panics
-    /// When the node is not of this kind's tree.
+    /// If the node is not in this kind's tree.
     pub fn lifted_position(&self, kind: VesselKind, node: NodeId) -> Vec3 {
         self.grown(kind).lifted_position(node)
     }
 
-    /// The vessels as they are drawn and written: [`tree`](Self::tree) with every node at its
+    /// The vessels as drawn and written: [`tree`](Self::tree) with every node at its
     /// [`lifted_position`](Self::lifted_position).
     pub fn vessels(&self, kind: VesselKind) -> VesselTree {
         self.grown(kind).vessels()

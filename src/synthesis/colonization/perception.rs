@@ -1,8 +1,8 @@
-//! Who hears a drain: open nodes, their perception volumes, and the drains of each node.
+//! Which node perceives a drain: open nodes, their perception volumes, and the drains of each node.
 
+use super::drains::{Drains, Found, ON_THE_NODE, cos_at};
 use super::forest::Forest;
 use super::lengths::Lengths;
-use crate::synthesis::colonization::drains::{Drains, Found, ON_THE_NODE, cos_at};
 use crate::synthesis::parallel;
 use bevy_math::{Vec3, ops};
 
@@ -26,8 +26,8 @@ pub(crate) fn is_open(forest: &Forest, lengths: &Lengths, node: u32) -> bool {
 /// Finds the drains that act in this step, sorted by node.
 ///
 /// A drain acts on its nearest open node within the influence distance, if it lies in that node's perception volume; if
-/// not, it waits. `nearest open node` is settled exactly: of two at one distance the older wins. Only drains that something
-/// happened to are asked, and those that acted in the step before.
+/// not, it waits. `nearest open node` is exact: of two at equal distance, the older wins. Only drains with a change
+/// nearby, and those that acted in the step before, are tested.
 pub(crate) fn associate(
     forest: &Forest,
     lengths: &Lengths,
@@ -48,13 +48,13 @@ pub(crate) fn associate(
         if acts {
             pulls.push(Pull { node, drain });
         }
-        // Where tips become finer from step to step, sprouts beside a vessel leave it at ever wider angles.
+        // If tips become finer from step to step, sprouts beside a vessel leave it at ever wider angles.
         acts || lengths.sprouts_turn && forest.children(node) == 1
     });
     pulls.sort_unstable();
 }
 
-/// Searches for nearest open nodes, for those drains that must look anew. Keeps its buffers.
+/// Searches the nearest open nodes of drains that need a new search. Reuses its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Search {
     asking: Vec<u32>,
@@ -74,7 +74,7 @@ impl Search {
     }
 }
 
-/// The nearest open node within the influence distance, and how near the nearest node of any kind is.
+/// The nearest open node within the influence distance, and the distance to the nearest node of any kind.
 fn nearest_open(forest: &Forest, lengths: &Lengths, center: Vec3) -> Found {
     let (nearest, closest) =
         forest.index().nearest_two(center, lengths.reach(), lengths.influence, |node| is_open(forest, lengths, node));
@@ -109,8 +109,8 @@ impl SproutAngle {
     }
 }
 
-/// Whether a drain lies in a node's perception volume; its distance has been tested before (Eq. 2 and 3). `cos` is that of
-/// the angle between the node's direction and the way to the drain.
+/// Whether a drain lies in a node's perception volume; its distance has been tested before (Eq. 2 and 3). `cos` is the
+/// cosine of the angle between the node's direction and the direction to the drain.
 fn perceives(forest: &Forest, lengths: &Lengths, node: u32, cos: f32, sprout: &mut SproutAngle) -> bool {
     if forest.is_root(node) || cos == ON_THE_NODE {
         return true;
@@ -122,7 +122,7 @@ fn perceives(forest: &Forest, lengths: &Lengths, node: u32, cos: f32, sprout: &m
     (angle - sprout.at(forest, node)).abs() <= lengths.half_perception
 }
 
-/// Compares the drains that act with what all drains would answer if each were asked.
+/// Compares the acting drains with the result of testing all drains.
 #[cfg(test)]
 pub(super) fn assert_none_sleeps_in(forest: &Forest, lengths: &Lengths, drains: &Drains, pulls: &[Pull]) {
     let reach = lengths.influence * lengths.influence;

@@ -46,7 +46,7 @@ impl Growth for Colonization {
 }
 
 impl Colonization {
-    /// The tree of a kind, with all that whoever draws or writes it asks for.
+    /// The tree of a kind, with all data for drawing and writing it.
     pub fn grown(&self, kind: VesselKind) -> GrownTree<'_> {
         GrownTree {
             tree: self.tree(kind),

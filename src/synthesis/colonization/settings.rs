@@ -1,8 +1,8 @@
 //! Settings of the growth, and their defaults.
 //!
 //! Source: Rauch & Harders, "Interactive Synthesis of 3D Geometries of Blood Vessels" (2021), sections 3 and 4. Lengths
-//! are in tissue lengths. The defaults are those of the paper's disc of diameter 1; [`ColonizationSettings::fit`] makes
-//! them fit a tissue of any size.
+//! are in tissue lengths. The defaults are those of the paper's disc of diameter 1; [`ColonizationSettings::fit`] fits
+//! them to a tissue of any size.
 
 pub use super::validity::{SettingsError, SettingsWarning};
 
@@ -10,30 +10,30 @@ use crate::synthesis::roots::RootSpacing;
 use crate::synthesis::tissue::{Extent, TissueGrowth};
 use crate::synthesis::tree::{ByKind, VesselKind};
 
-/// Which measure of the spread of drains around a tip decides on a bifurcation.
+/// The measure of the drains' spread around a tip that decides on a bifurcation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum AngleSpread {
-    /// The standard deviation, as the paper's text has it.
+    /// The standard deviation, as in the paper's text.
     #[default]
     StandardDeviation,
-    /// The root of the summed squares, not divided by their number, as the paper's own program computes it. The
-    /// threshold is then reached sooner the more drains there are.
+    /// The root of the summed squares, not divided by their number, as in the paper's own program. More drains then
+    /// reach the threshold sooner.
     RootSumOfSquares,
 }
 
 /// Settings of one system, arterial or venous.
 ///
-/// Every length is multiplied by λ_t = σ₀/σ_t as the tissue grows by [`tissue_growth`](Self::tissue_growth).
+/// All lengths are multiplied by λ_t = σ₀/σ_t as the tissue grows by [`tissue_growth`](Self::tissue_growth).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct SystemSettings {
-    /// Weight ω of the direction a vessel already has against the direction to its drains (Eq. 4).
+    /// Weight ω of a vessel's present direction against the direction to its drains (Eq. 4).
     ///
-    /// Higher values give straighter vessels; near 1 they no longer turn towards what they should supply.
+    /// Higher values give straighter vessels; near 1 they no longer turn towards the tissue that they should supply.
     ///
     /// Limits: 0 to 1. Default: [`Self::DEFAULT_DIRECTION_WEIGHT`].
     pub direction_weight: f32,
@@ -51,7 +51,8 @@ pub struct SystemSettings {
     pub node_birth_distance: f32,
     /// Distance δ within which a drain acts on its nearest node (Eq. 2 and 3).
     ///
-    /// Higher values let vessels feel drains from afar and take fewer, smoother turns; lower values leave drains unheard.
+    /// Higher values let vessels react to distant drains with fewer, smoother turns; lower values leave drains without
+    /// effect.
     ///
     /// Units: tissue lengths. Limits: > 0. Default: [`Self::DEFAULT_INFLUENCE_DISTANCE`].
     pub influence_distance: f32,
@@ -63,7 +64,7 @@ pub struct SystemSettings {
     pub kill_distance: f32,
     /// Full opening angle γ of a node's perception volume (Eq. 2 and 3).
     ///
-    /// Higher values let vessels answer drains beside them, and bend more sharply.
+    /// Higher values let vessels react to drains beside them, and bend more sharply.
     ///
     /// Units: degrees. Limits: 0 to 360. Default: [`Self::DEFAULT_PERCEPTION_ANGLE`].
     pub perception_angle: f32,
@@ -73,48 +74,48 @@ pub struct SystemSettings {
     ///
     /// Units: tissue lengths. Limits: > 0. Default: [`Self::DEFAULT_TERMINAL_RADIUS`].
     pub terminal_radius: f32,
-    /// Whether the terminal radius shrinks with λ_t like every other length, as the paper's text says. Its own program
-    /// keeps it.
+    /// Whether the terminal radius shrinks with λ_t like all other lengths, as in the paper's text. The paper's own
+    /// program keeps it constant.
     ///
     /// Default: true.
     pub scale_terminal_radius: bool,
     /// Length d of a new segment.
     ///
-    /// Lower values give smoother vessels and more nodes. Above the kill distance vessels overshoot what they grow to.
+    /// Lower values give smoother vessels and more nodes. Above the kill distance vessels overshoot their drains.
     ///
     /// Units: tissue lengths. Limits: > 0. Default: [`Self::DEFAULT_STEP_LENGTH`].
     pub step_length: f32,
-    /// Spread φ of the angles to its drains from which on a tip bifurcates symmetrically.
+    /// Spread φ of the angles to its drains from which a tip bifurcates symmetrically.
     ///
     /// Higher values give fewer symmetric bifurcations, hence more lateral branches from a dominant vessel. Infinity (or
     /// anything above 180) turns them off.
     ///
     /// Units: degrees. Limits: ≥ 0. Default: [`Self::DEFAULT_BIFURCATION_THRESHOLD`].
     pub bifurcation_threshold: f32,
-    /// How the spread that is compared with the threshold is measured.
+    /// The measure of the spread that is compared with the threshold.
     ///
     /// Default: the standard deviation.
     pub angle_spread: AngleSpread,
     /// Exponent κ of Murray's law, r_p^κ = r_l^κ + r_r^κ.
     ///
-    /// Higher values make parents less thick than their children together need, and bifurcations wider.
+    /// Higher values make parents thinner relative to their children, and bifurcations wider.
     ///
     /// Limits: 2 to 4, both excluded. Default: [`Self::DEFAULT_BIFURCATION_EXPONENT`].
     pub bifurcation_exponent: f32,
-    /// Law by which the tissue grows, and lengths shrink.
+    /// Law of tissue growth, by which lengths shrink.
     ///
     /// Default: linear, [`TissueGrowth::DEFAULT_LINEAR`] a step.
     pub tissue_growth: TissueGrowth,
-    /// Whether vessels may sprout sideways between two nodes. Without, only tips grow and bifurcate, as the paper's
-    /// conjunctiva does.
+    /// Whether vessels may sprout sideways between two nodes. If not, only tips grow and bifurcate, as in the paper's
+    /// conjunctiva.
     ///
     /// Default: true.
     pub lateral_sprouts: bool,
-    /// How many vessels may leave a root.
+    /// Most vessels that may leave a root.
     ///
-    /// With 1, as in the paper, a root inside the tissue whose only vessel runs to a near edge can never reach what lies
-    /// behind it: on a disc about 2 % of random roots then supply next to nothing, with 2 none of 400. Narrow organs need
-    /// more.
+    /// With 1, as in the paper, a root inside the tissue whose only vessel grows to a near edge can never reach the
+    /// tissue behind it: on a disc about 2 % of random roots then supply next to nothing, with 2 none of 400. Narrow
+    /// organs need more.
     ///
     /// Limits: ≥ 1. Default: [`Self::DEFAULT_ROOT_CHILDREN`].
     pub root_children: u32,
@@ -141,12 +142,12 @@ impl SystemSettings {
     pub const DEFAULT_BIFURCATION_THRESHOLD: f32 = 15.0;
     /// κ of the paper.
     pub const DEFAULT_BIFURCATION_EXPONENT: f32 = 2.55;
-    /// Vessels that may leave a root.
+    /// Default of [`root_children`](Self::root_children).
     pub const DEFAULT_ROOT_CHILDREN: u32 = 4;
     /// Venous influence distance, as a multiple of the arterial one, that keeps the venous tree from stalling.
     ///
-    /// The drains handed over lie where the arteries were, which the veins reach only from further away. At 1 most venous
-    /// trees stall on a disc, at 1.5 some of a hundred do, at 2 some on narrow organs.
+    /// The drains handed over are near the arteries, and the veins reach them only from further away. At 1 most venous
+    /// trees stall on a disc, at 1.5 some of a hundred, at 2 some on narrow organs.
     pub const DEFAULT_VENOUS_INFLUENCE_FACTOR: f32 = 2.5;
 
     /// Multiplies every length by `factor`. Angles, weights and exponents stay.
@@ -186,7 +187,7 @@ impl Default for SystemSettings {
     }
 }
 
-/// Settings of a growth: both systems, and what they share.
+/// Settings of a growth: both systems, and common settings.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
@@ -196,13 +197,13 @@ pub struct ColonizationSettings {
     ///
     /// More steps fill the tissue further. Limits: ≥ 1. Default: [`Self::DEFAULT_STEPS`].
     pub steps: u32,
-    /// Candidates for a drain drawn from the tissue in each step.
+    /// Candidates for drains that are drawn from the tissue in each step.
     ///
     /// More samples fill the tissue faster. Default: [`Self::DEFAULT_SAMPLES`].
     pub samples: u32,
-    /// Growth ends before its last step when so many steps in a row, after the tissue has ceased to grow, brought neither a
-    /// drain nor a segment: the tissue is full, or what is left of it is out of reach. A tissue that changes in stages is
-    /// grown to the last step all the same.
+    /// Growth ends early if this many steps in a row, after the tissue has stopped growing, gave neither a drain nor a
+    /// segment: the tissue is full, or the rest is out of reach. On a staged tissue, growth always goes on to the last
+    /// step.
     ///
     /// 0 turns this off. Default: [`Self::DEFAULT_IDLE_STEPS`].
     pub idle_steps: u32,
@@ -223,13 +224,13 @@ pub struct ColonizationSettings {
 }
 
 impl ColonizationSettings {
-    /// Steps of the paper's examples.
+    /// Number of steps in the paper's examples.
     pub const DEFAULT_STEPS: u32 = 100;
-    /// Samples a step of the paper's examples.
+    /// Samples per step in the paper's examples.
     pub const DEFAULT_SAMPLES: u32 = 1000;
-    /// With the default samples 20,000 of them have then been refused in a row.
+    /// With the default number of samples, 20,000 in a row have then been refused.
     pub const DEFAULT_IDLE_STEPS: u32 = 20;
-    /// Most samples a step; more than this is surely a slip.
+    /// Most samples per step; more is surely a mistake.
     pub const MAX_SAMPLES: u32 = 100_000_000;
 
     /// The settings of both systems, arteries first.
@@ -242,7 +243,7 @@ impl ColonizationSettings {
         self.systems().into_iter().find(|&(own, _)| own == kind).map(|(_, settings)| settings)
     }
 
-    /// What the placement of roots needs to know.
+    /// The spacing of roots.
     pub fn root_spacing(&self) -> ByKind<Option<RootSpacing>> {
         ByKind::from_fn(|kind| {
             self.system(kind).map(|system| RootSpacing { step: system.step_length, reach: system.influence_distance })
@@ -257,14 +258,14 @@ impl ColonizationSettings {
         self
     }
 
-    /// Lengths in a volume as a multiple of those on a surface of the same equivalent diameter: the paper's ball against
-    /// its disc. The same samples have more to fill there.
+    /// Ratio of lengths in a volume to those on a surface of the same equivalent diameter, as in the paper's ball and
+    /// disc. There the same samples have more to fill.
     pub const VOLUME_FACTOR: f32 = 1.5;
 
-    /// Fits settings made for a surface of equivalent diameter 1, as all presets are, to a tissue of any size; in a volume
-    /// lengths come out [`VOLUME_FACTOR`](Self::VOLUME_FACTOR) times as long.
+    /// Fits settings made for a surface of equivalent diameter 1, as in all presets, to a tissue of any size; in a
+    /// volume lengths become [`VOLUME_FACTOR`](Self::VOLUME_FACTOR) times as long.
     ///
-    /// A 0.3 m organ and the same organ of 300 mm then grow alike, but for what rounding changes.
+    /// An organ of 0.3 m and the same organ of 300 mm then grow alike, except for rounding.
     #[must_use]
     pub fn fit(self, extent: Extent) -> Self {
         let factor = if let Extent::Volume(_) = extent { Self::VOLUME_FACTOR } else { 1.0 };

@@ -1,13 +1,14 @@
 //! The parts of a step, in their order: candidates, arteries, veins.
 
 use super::candidates::{Candidates, Draws};
+use super::report::SystemReport;
+use super::settings::ColonizationSettings;
 use super::system_growth::{Ground, Supplied, SystemGrowth};
 use super::vacancy::Vacancy;
-use super::{ColonizationSettings, SystemReport};
 use crate::synthesis::tissue::{Extent, Tissue};
 use crate::synthesis::tree::BedLink;
 
-/// A step, which may be taken part by part.
+/// A step, which may be done part by part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step<'a> {
     pub tissue: &'a dyn Tissue,
@@ -17,8 +18,8 @@ pub(super) struct Step<'a> {
 }
 
 impl<'a> Step<'a> {
-    /// Draws candidates, and finds out which of them are in tissue that the arteries supply. Where it is known what of the
-    /// tissue is vacant, they are drawn there.
+    /// Draws candidates, and finds those in tissue that the arteries supply. They are drawn from vacant tissue if that
+    /// is known.
     pub fn choose_candidates(
         self,
         draws: &mut Draws,
@@ -26,7 +27,7 @@ impl<'a> Step<'a> {
         vacancy: &mut Vacancy,
         arteries: &SystemGrowth,
     ) {
-        // A staged tissue is another one from stage to stage, and has no pieces of its own.
+        // A staged tissue changes from stage to stage, and has no pieces of its own.
         if self.tissue.stage(1).is_none() {
             let (nodes, drains) = (arteries.forest.tree.positions(), arteries.drains.living());
             vacancy.prepare(self.tissue, arteries.length_scale(), nodes, drains);
@@ -40,8 +41,8 @@ impl<'a> Step<'a> {
         draws.draw(self.tissue.at_step(self.number), vacancy, self.number, self.settings.samples);
     }
 
-    /// Lets candidates in unsupplied tissue become drains, and grows the arteries towards them. The number of drains born
-    /// comes back.
+    /// Makes candidates in unsupplied tissue drains, and grows the arteries towards them. Returns the number of drains
+    /// born.
     pub fn grow_arteries(
         self,
         arteries: &mut SystemGrowth,
@@ -73,7 +74,7 @@ impl<'a> Step<'a> {
         report
     }
 
-    /// Where new nodes may be put.
+    /// The tissue and rules for placing new nodes.
     pub fn ground(self) -> Ground<'a> {
         let tissue = self.tissue.at_step(self.number);
         let surface = matches!(tissue.extent(), Extent::Area(_));
@@ -81,8 +82,8 @@ impl<'a> Step<'a> {
         Ground { tissue, no_go: tissue.no_go(), confine, normals }
     }
 
-    /// Number of steps in a row that brought nothing, given the one before this and whether this `acted`. Steps do not count
-    /// as long as tissue that grows or changes may need more vessels.
+    /// Number of steps in a row without growth, given the number before this step and whether this one `acted`. Steps
+    /// do not count while tissue that grows or changes may need more vessels.
     pub fn idle_after(self, idle: u32, acted: bool) -> u32 {
         let settled = self.settings.systems().iter().all(|(_, system)| system.tissue_growth.is_over(self.number));
         if acted || !settled || self.tissue.stage(self.number).is_some() { 0 } else { idle + 1 }

@@ -1,12 +1,12 @@
 //! One growth step of one system: associate, grow, kill (Rauch & Harders 2021, section 3).
 
-use super::SystemReport;
 use super::direction::{Decision, decide};
+use super::drains::{Drains, News};
 use super::forest::Forest;
 use super::lengths::Lengths;
 use super::perception::{self, Pull, Search};
+use super::report::SystemReport;
 use super::settings::SystemSettings;
-use crate::synthesis::colonization::drains::{Drains, News};
 use crate::synthesis::parallel;
 use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::tissue::{NoGoField, Tissue, TissuePoint};
@@ -15,21 +15,21 @@ use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d};
 use std::ops::Range;
 
-/// Where new nodes may be put in a step.
+/// The tissue and rules for placing new nodes in a step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ground<'a> {
     /// The tissue in force.
     pub tissue: &'a dyn Tissue,
     /// Where no node may be placed.
     pub no_go: Option<&'a NoGoField>,
-    /// Whether nodes that leave it are brought back.
+    /// Whether nodes that leave the tissue are brought back.
     pub confine: bool,
-    /// Whether nodes need the tissue's normal although they are not brought back.
+    /// Whether nodes need the tissue's normal even if they are not brought back.
     pub normals: bool,
 }
 
 impl Ground<'_> {
-    /// Where the end of a new segment comes to lie; `None` where no vessel may be, halfway or at the end.
+    /// Place of the end of a new segment; `None` if its middle or end is forbidden.
     fn place(&self, from: Vec3, to: Vec3) -> Option<TissuePoint> {
         let end = self.confined(to);
         let forbidden = |point| self.no_go.is_some_and(|no_go| no_go.forbids(point));
@@ -48,15 +48,15 @@ impl Ground<'_> {
 /// A drain that a vessel has supplied.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Supplied {
-    /// The slot that it had.
+    /// Its old slot.
     pub drain: u32,
-    /// Where it was.
+    /// Its position.
     pub position: Vec3,
     /// The node that supplied it: its nearest open one.
     pub node: u32,
 }
 
-/// A node that grows, and the ends of its new segments, two at most.
+/// A growing node, and the ends of its new segments, at most two.
 #[derive(Clone, Copy, Debug, Default)]
 struct Growing {
     node: u32,
@@ -69,24 +69,24 @@ pub(crate) struct SystemGrowth {
     pub forest: Forest,
     pub drains: Drains,
     pub lengths: Lengths,
-    /// Size σ_t of the tissue as this system sees it.
+    /// Size σ_t of the tissue for this system.
     size: f32,
     settings: SystemSettings,
     search: Search,
     pulls: Vec<Pull>,
-    /// Which pulls are at the same node, and where it grows to.
+    /// Ranges of pulls on the same node, and the growth of that node.
     pulled: Vec<Range<usize>>,
     growing: Vec<Growing>,
     news: News,
     /// Drains supplied in the last step.
     supplied: Vec<Supplied>,
-    /// Of drains that came from the other system, the node there that supplied them, by slot.
+    /// For drains from the other system, the node there that supplied them, by slot.
     givers: Vec<u32>,
 }
 
-/// A new node nearer than this share of a step length to another one is not made.
+/// A new node is not made nearer than this share of a step length to another one.
 const LEAST_SEPARATION: f32 = 1e-3;
-/// Cells are laid anew once their side has left this range of the side that fits.
+/// Cells are laid out again once their side has left this range, relative to the fitting side.
 const FITTING_CELLS: Range<f32> = 0.6..1.5;
 
 impl SystemGrowth {
@@ -111,7 +111,7 @@ impl SystemGrowth {
         system
     }
 
-    /// Removes all nodes and drains and takes new settings, keeping memory.
+    /// Removes all nodes and drains, and takes new settings, keeping memory.
     pub fn restart(&mut self, settings: &SystemSettings, bounds: &Aabb3d) {
         self.settings.clone_from(settings);
         self.size = 1.0;
@@ -122,7 +122,7 @@ impl SystemGrowth {
         self.givers.clear();
     }
 
-    /// Adds roots, and trees to go on growing from.
+    /// Adds roots, and given trees.
     pub fn plant(&mut self, roots: &[TissuePoint], given: Option<&VesselTree>, ground: Ground<'_>) {
         for &root in roots {
             self.forest.add_root(root, self.settings.terminal_radius);
@@ -147,7 +147,7 @@ impl SystemGrowth {
     pub fn refuse(&self, candidates: &[Vec3], refused: &mut [bool]) {
         let (nodes, drains) = (self.forest.index(), self.drains.index());
         let Lengths { node_birth, drain_birth, .. } = self.lengths;
-        // What is quickly asked first.
+        // Quick tests first.
         drains.mark_beside(candidates, drain_birth, refused);
         nodes.mark_beside(candidates, node_birth, refused);
         for (&candidate, refused) in candidates.iter().zip(refused).filter(|(_, refused)| !**refused) {
@@ -155,7 +155,7 @@ impl SystemGrowth {
         }
     }
 
-    /// Lets a candidate that has not been refused become a drain, unless one has been born too near it meanwhile.
+    /// Makes a candidate that has not been refused a drain, unless one has been born too near it meanwhile.
     pub fn offer_drain(&mut self, candidate: Vec3) -> Option<u32> {
         let room = !self.drains.index().any_within(candidate, self.lengths.drain_birth);
         room.then(|| self.drains.add(candidate))
@@ -173,8 +173,7 @@ impl SystemGrowth {
         }
     }
 
-    /// Where blood comes over from the other system by the drains supplied in the last step: that system's node, and this
-    /// one's.
+    /// Links from the other system by the drains supplied in the last step: that system's node, and this one's.
     pub fn links(&self) -> impl Iterator<Item = BedLink> + '_ {
         let giver = |supplied: &Supplied| NodeId(self.givers[supplied.drain as usize]);
         self.supplied.iter().map(move |supplied| BedLink { arterial: giver(supplied), venous: NodeId(supplied.node) })
@@ -185,7 +184,7 @@ impl SystemGrowth {
         &self.supplied
     }
 
-    /// One step of growth. Radii are right after the next [`settle`](Forest::settle).
+    /// One step of growth. The next [`settle`](Forest::settle) updates the radii.
     pub fn grow(&mut self, ground: Ground<'_>, step: u32) -> SystemReport {
         let first_new = self.forest.tree.len() as u32;
         self.forest.set_tip_radius(self.lengths.terminal_radius);
@@ -202,7 +201,7 @@ impl SystemGrowth {
         }
     }
 
-    /// Decides for every node that drains pull at where it grows to.
+    /// Decides for every node with acting drains where it grows to.
     fn decide(&mut self, ground: Ground<'_>) {
         let Self { forest, drains, lengths, pulls, pulled, growing, .. } = self;
         pulled.clear();
@@ -225,7 +224,7 @@ impl SystemGrowth {
         });
     }
 
-    /// Adds the segments that were decided on, but those that would end on another node or nowhere.
+    /// Adds the decided segments, except those that would end on another node or at no place.
     fn extend(&mut self, step: u32) {
         let Self { forest, lengths, growing, .. } = self;
         for growing in growing {
@@ -239,8 +238,7 @@ impl SystemGrowth {
         }
     }
 
-    /// Wakes the drains to which something has happened: nodes that have children now or another sprout angle, and new
-    /// nodes within reach.
+    /// Wakes drains with a change: their node has new children or another sprout angle, or a new node is within reach.
     fn spread_news(&mut self, first_new: u32) {
         let Self { forest, drains, lengths, news, .. } = self;
         let nodes = forest.tree.len() as u32;
@@ -269,7 +267,7 @@ impl SystemGrowth {
         self.drains.forget_the_gone();
     }
 
-    /// Lets the tissue grow, which shortens all lengths relative to it.
+    /// Grows the tissue, which shortens all lengths relative to it.
     pub fn advance_tissue(&mut self, step: u32) {
         self.size = self.settings.tissue_growth.advance(self.size, step);
         let before = self.lengths.reach();
@@ -285,20 +283,20 @@ impl SystemGrowth {
         }
     }
 
-    /// λ_t: what lengths are multiplied by at the present size of the tissue.
+    /// λ_t: the factor of lengths at the present size of the tissue.
     pub fn length_scale(&self) -> f32 {
         self.size.recip()
     }
 }
 
-/// Whether an index is to be laid anew, with cells of a side that fits the lengths.
+/// Whether an index needs new cells, with a side that fits the lengths.
 fn needs_laying(index: &PointGrid, fitting: f32) -> bool {
     !FITTING_CELLS.contains(&(fitting / index.cell())) || index.is_scattered()
 }
 
 #[cfg(test)]
 impl SystemGrowth {
-    /// Compares what the drains know of their nearest open node with every drain asking every node.
+    /// Compares the drains' knowledge of their nearest open node with a brute-force search.
     pub(crate) fn assert_association_exact(&mut self) {
         perception::associate(&self.forest, &self.lengths, &mut self.drains, &mut self.search, &mut self.pulls);
         perception::assert_none_sleeps_in(&self.forest, &self.lengths, &self.drains, &self.pulls);

@@ -1,4 +1,4 @@
-//! Tests that look inside a growth: exact association, and cases where nothing may break.
+//! Tests of a growth's internals: exact association, and edge cases.
 
 use super::*;
 use crate::synthesis::roots::{RootPlacement, RootPlacements};
@@ -29,7 +29,7 @@ fn growth(settings: ColonizationSettings) -> Colonization {
     Colonization::new(disc(), settings, &roots(), 3).expect("valid settings")
 }
 
-/// What must hold of both trees after every step.
+/// Invariants of both trees after every step.
 fn assert_sound(growth: &Colonization) {
     for kind in Colonization::KINDS {
         let tree = growth.tree(kind);
@@ -44,7 +44,7 @@ fn assert_sound(growth: &Colonization) {
 #[test]
 fn association_equals_its_brute_force_twin_at_every_step() {
     let ball: Arc<dyn Tissue> = Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball of radius 0.5"));
-    // Lengths that shrink, lengths that grow again, and open nodes of every kind.
+    // Lengths that shrink and grow again, and open nodes of every kind.
     let swinging = TissueGrowth::from_fn(30, |step| if step % 7 < 4 { 1.0 + 0.1 * step as f32 } else { 1.0 });
     for (case, tissue) in [disc(), disc(), ball].into_iter().enumerate() {
         let mut settings = ColonizationSettings { steps: 30, samples: 300, ..ColonizationSettings::default() };
@@ -97,11 +97,11 @@ fn a_full_tissue_ends_growth_early_and_loses_nothing_by_it() {
     assert_eq!((stepped.steps_done(), whole.steps_done()), (steps, 3000));
     for kind in Colonization::KINDS {
         assert_eq!(ended.tree(kind), stepped.tree(kind));
-        // Some last gaps are smaller than the samples of the idle steps could find.
+        // The last gaps are too small for the samples of the idle steps.
         let (nodes, all) = (ended.tree(kind).len(), whole.tree(kind).len());
         assert!(nodes * 100 >= all * 95, "{} has {nodes} nodes of {all}", kind.name());
     }
-    // Where tissue grows there is always something to do again.
+    // Growing tissue always needs further vessels.
     settings.steps = 60;
     settings.arterial.tissue_growth = TissueGrowth::Table(vec![1.0; 60]);
     let mut growing =
@@ -155,7 +155,7 @@ fn opposite_drains_leave_a_root_at_rest() {
 
 #[test]
 fn a_node_that_would_lie_on_another_is_not_made() {
-    // Two drains on either side make the tip bifurcate again and again around the same place.
+    // A drain on either side makes the tip bifurcate repeatedly around the same place.
     let growth = pulled_by(&[Vec3::new(-0.45, 0.02, 0.0), Vec3::new(-0.45, -0.02, 0.0)], |settings| {
         settings.arterial.kill_distance = 1e-4;
         settings.arterial.perception_angle = 360.0;
@@ -177,7 +177,7 @@ fn leaf_only_development_never_sprouts_sideways() {
     let births = growth.birth_steps(VesselKind::Artery);
     let children = tree.children();
     for node in 0..tree.len() {
-        // A root is no inter-node: its vessels may leave it at any time.
+        // A root is not an inter-node: its vessels may leave it at any time.
         if let [a, b] = *children.of(node)
             && tree.parent(NodeId(node as u32)).is_some()
         {
@@ -241,7 +241,7 @@ fn changed_radii_are_those_that_changed() {
             } else {
                 expected.collect()
             };
-            // A radius may be written anew with the same value; none that changed may be missing.
+            // A radius may be written again with the same value, but no changed one may be missing.
             assert!(expected.iter().all(|node| changed.binary_search(node).is_ok()));
             assert!(changed.len() <= expected.len() + radii.len() / 10);
             old.clear();

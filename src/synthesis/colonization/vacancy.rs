@@ -1,12 +1,14 @@
-//! Which parts of the tissue can still take a drain, so that candidates are drawn from these alone.
+//! Tracks the parts of the tissue that can still take a drain, so that candidates are drawn only there.
 //!
-//! As tissue fills, nearly every candidate is refused: it lies within the birth distance of a node or of a drain. The tissue
-//! is cut into small [pieces](TissuePiece), and a piece that lies wholly within the reach of one of these *blockers* can take no
-//! drain. Of the samples of a step, as many are drawn from the other pieces as would have fallen there: one in so many each,
-//! as their share of the tissue says. What is accepted is distributed as if all samples had been drawn.
+//! As tissue fills, nearly every candidate is refused, because it lies within the birth distance of a node or of a
+//! drain. The tissue is cut into small [pieces](TissuePiece), and a piece that lies wholly within the reach of one of
+//! these *blockers* can take no drain. Only the samples of a step that would fall on the other pieces are drawn: their
+//! number is random, by the pieces' share of the tissue. Accepted candidates are distributed as if all samples had been
+//! drawn.
 //!
-//! Blockers' reaches shrink with λ. Every piece remembers at which λ its nodes, and one of its drains, let go of it. Pieces
-//! are looked over whenever λ has shrunk by a little, and count as blocked only if they stay so until the next time.
+//! Blockers' reaches shrink with λ. Every piece stores the λ below which its nodes, and one of its drains, stop
+//! blocking it. Pieces are checked whenever λ has shrunk a little, and count as blocked only if they stay so until the
+//! next check.
 
 use crate::synthesis::random::VesselRng;
 use crate::synthesis::random::alias_table::AliasTable;
@@ -17,25 +19,25 @@ use bevy_math::Vec3;
 
 /// Reach of a piece as a share of the smaller radius of the blockers, when pieces are cut.
 const FINENESS: f32 = 0.4;
-/// Share of the λ that pieces were cut for at which they are cut anew.
+/// Share of the λ of the last cut at which pieces are cut again.
 const COARSE: f32 = 0.6;
-/// By how much λ shrinks from one look over the pieces to the next.
+/// Factor by which λ shrinks between two checks of the pieces.
 const PATIENCE: f32 = 0.85;
-/// Pieces of more than this share of the radius are not worth their while.
+/// Pieces of more than this share of the radius don't pay.
 const USELESS: f32 = 0.45;
-/// Share of the listed pieces that must be free; else they are listed anew.
+/// Share of the listed pieces that must be free; otherwise they are listed again.
 const ENOUGH: f64 = 0.5;
 /// Fewest samples in a whole growth for every piece: more pieces than that cost more than they save.
 const SAMPLES_PER_PIECE: u64 = 50;
-/// What stands for no drain.
+/// No drain.
 const NONE: u32 = u32::MAX;
 
-/// The pieces of a tissue, and what blocks them.
+/// The pieces of a tissue, and their blockers.
 #[derive(Debug, Default)]
 pub(crate) struct Vacancy {
     /// Radii of nodes and drains as blockers, at λ = 1.
     radii: [f32; 2],
-    /// The λ for which the pieces were cut, and that at which they are looked over next. Nought before the first time.
+    /// The λ of the last cut, and that of the next check of the pieces. Zero before the first time.
     cut_at: f32,
     until: f32,
     pieces: Vec<TissuePiece>,
@@ -44,22 +46,22 @@ pub(crate) struct Vacancy {
     /// The reach for which pieces were cut.
     reach: f32,
     blocked: Vec<Blocked>,
-    /// Number of nodes that are known.
+    /// Number of known nodes.
     covered: usize,
     /// Samples of the whole growth.
     samples: u64,
     /// Pieces that candidates are drawn from: all that were free when the list was made.
     listed: Vec<u32>,
-    /// How the listed ones are drawn, unless they are `even` in measure.
+    /// Draws the listed ones, unless they are `even` in measure.
     shares: AliasTable,
     even: bool,
-    /// Measures of the whole tissue, of the listed pieces, and of those among them that are free.
+    /// Measures of the whole tissue, of the listed pieces, and of the free ones among them.
     whole: f64,
     listed_measure: f64,
     free_measure: f64,
 }
 
-/// Below which λ a piece is left by all nodes, and by one drain.
+/// The λ below which no node blocks a piece, and that of one drain.
 #[derive(Clone, Copy, Debug)]
 struct Blocked {
     by_nodes: f32,
@@ -76,14 +78,14 @@ impl Blocked {
 }
 
 impl Vacancy {
-    /// Takes the radii of nodes and drains as blockers, at λ = 1, and the samples of the whole growth.
+    /// Sets the radii of nodes and drains as blockers, at λ = 1, and the samples of the whole growth.
     pub fn reset(&mut self, radii: [f32; 2], samples: u64) {
         (self.radii, self.samples) = (radii, samples);
         (self.cut_at, self.until) = (0.0, 0.0);
         self.pieces.clear();
     }
 
-    /// Makes ready for the candidates of a step, given λ and all blockers. Nothing is done for tissues that cannot be cut.
+    /// Prepares for the candidates of a step, given λ and all blockers. Does nothing for tissues that cannot be cut.
     pub fn prepare(
         &mut self,
         tissue: &dyn Tissue,
@@ -111,7 +113,7 @@ impl Vacancy {
         }
     }
 
-    /// This, where there is something to choose: pieces of the tissue.
+    /// Returns this if the tissue has pieces to choose from.
     pub fn chosen(&self) -> Option<&Self> {
         (!self.pieces.is_empty()).then_some(self)
     }
@@ -166,7 +168,7 @@ impl Vacancy {
         });
     }
 
-    /// Takes note of a drain that has been born.
+    /// Adds a drain that has been born.
     pub fn add_drain(&mut self, drain: u32, position: Vec3) {
         let Self { pieces, index, blocked, until, radii, .. } = self;
         if pieces.is_empty() {
@@ -182,7 +184,7 @@ impl Vacancy {
         });
     }
 
-    /// Takes note of a drain that has left.
+    /// Removes a drain that is gone.
     pub fn remove_drain(&mut self, drain: u32, position: Vec3) {
         let Self { pieces, index, blocked, until, radii, .. } = self;
         if pieces.is_empty() {
@@ -196,8 +198,8 @@ impl Vacancy {
         });
     }
 
-    /// Draws as many candidates as of `count` samples fall on listed pieces, less those on pieces that are blocked by now.
-    /// There must be pieces.
+    /// Draws as many candidates as fall on listed pieces of `count` samples, except those on pieces that are blocked by
+    /// now. There must be pieces.
     pub fn draw(&self, tissue: &dyn Tissue, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
         let share = self.listed_measure / self.whole;
         let falling = if share < 1.0 { many::count_below(rng, count, share) } else { count };
@@ -223,7 +225,7 @@ mod tests {
     use bevy_math::Vec2;
     use std::sync::Arc;
 
-    /// A pyramid without a base, of large triangles and one that is small.
+    /// A pyramid without a base, of large triangles and a small one.
     fn pyramid() -> MeshSurface {
         let positions =
             [(0.5, 0.5, 0.4), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0), (1.1, 0.0, 0.0)];
@@ -264,7 +266,8 @@ mod tests {
         }
     }
 
-    /// Draws from the pieces against plain draws: as many in every part of the tissue, whatever blocks the rest of it.
+    /// Compares draws from the pieces with plain draws: equally many in every part of the tissue, whatever blocks the
+    /// rest.
     #[test]
     fn what_is_drawn_is_distributed_as_without_pieces() {
         const SAMPLES: u32 = 400_000;
@@ -281,7 +284,7 @@ mod tests {
             vacancy.reset([0.16, 0.12], u64::from(SAMPLES));
             let numbered = || drains.iter().enumerate().map(|(slot, &position)| (slot as u32, position));
             vacancy.prepare(tissue.as_ref(), 1.0, nodes, numbered());
-            // Drains that leave and come again, and a λ that shrinks and swells, must leave no trace.
+            // Drains that are removed and added again, and a λ that shrinks and grows, must leave no trace.
             vacancy.remove_drain(3, drains[3]);
             vacancy.add_drain(3, drains[3]);
             [0.9, 0.5, 1.0].into_iter().for_each(|scale| vacancy.prepare(tissue.as_ref(), scale, nodes, numbered()));

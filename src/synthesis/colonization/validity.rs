@@ -1,16 +1,16 @@
-//! The limits of the settings, and warnings of combinations with known artefacts.
+//! The limits of the settings, and warnings about combinations with known artefacts.
 
 use super::settings::{ColonizationSettings, SystemSettings};
 use crate::synthesis::tree::VesselKind;
 use std::fmt;
 
-/// A setting that growth cannot start with.
+/// A setting with which growth cannot start.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SettingsError {
     /// A value outside its limits.
     #[error("{system} {name} is {value}; it must be {limits}")]
     OutOfRange {
-        /// The system whose setting it is.
+        /// The system in question.
         system: &'static str,
         /// Name of the field.
         name: &'static str,
@@ -29,12 +29,12 @@ pub enum SettingsError {
         /// What it may be.
         limits: &'static str,
     },
-    /// A law of tissue growth that reaches a size of zero, or none.
+    /// A law of tissue growth that reaches a size of zero, or an invalid one.
     #[error(
         "{system} tissue_growth reaches a size of {size}; sizes must stay finite and above 0 for all {steps} steps"
     )]
     TissueGrowth {
-        /// The system whose setting it is.
+        /// The system in question.
         system: &'static str,
         /// The size that was reached.
         size: f32,
@@ -43,10 +43,10 @@ pub enum SettingsError {
     },
 }
 
-/// A combination of settings that grows, but with an artefact (Fig. 6 of the paper).
+/// A valid combination of settings that gives an artefact (Fig. 6 of the paper).
 #[derive(Clone, Debug, PartialEq)]
 pub enum SettingsWarning {
-    /// Vessels overshoot the drains they grow to and collide.
+    /// Vessels overshoot their drains and collide.
     StepExceedsKill {
         /// The system in question.
         system: VesselKind,
@@ -55,7 +55,7 @@ pub enum SettingsWarning {
         /// Its kill distance.
         kill: f32,
     },
-    /// Drains count as supplied further away than they are heard.
+    /// Drains count as supplied beyond the distance at which they act.
     InfluenceBelowKill {
         /// The system in question.
         system: VesselKind,
@@ -71,7 +71,7 @@ pub enum SettingsWarning {
         /// Its perception angle in degrees.
         degrees: f32,
     },
-    /// Vessels grow straight past what they should supply.
+    /// Vessels grow straight past the tissue that they should supply.
     StrongDirection {
         /// The system in question.
         system: VesselKind,
@@ -127,7 +127,7 @@ impl ColonizationSettings {
     /// Direction weight above which vessels miss their drains.
     const STRONG_DIRECTION: f32 = 0.95;
 
-    /// Checks every value against its limits, and names the combinations that give known artefacts.
+    /// Checks every value against its limits, and returns warnings about combinations with known artefacts.
     ///
     /// # Errors
     /// The first value outside its limits. Settings that pass cannot make a growth step fail.

@@ -1,14 +1,12 @@
-//! Bleeding over time: what each open end loses, and when it stops.
+//! Bleeding over time: the loss of each open end, until it stops.
 //!
 //! In: a [`Network`] with its interruptions, and the blood of the patient. Out: for every open end its flow, pressure,
-//! velocity, loss and state; the loss of the organ; what began or stopped to bleed.
+//! velocity, loss and state; the loss of the organ; ends that began or stopped bleeding.
 //!
-//! A step takes openings, root and bed pressure at its middle, solves for the flow of all ends together and lets it last
-//! for the whole step: second order in the step, and the loss is the time integral of the reported flow exactly. A long
-//! step is made of shorter ones, so that a fast heart is followed and a simulator may skip minutes.
+//! A step evaluates openings, root and bed pressure at its middle, solves for the flow of all ends together and keeps
+//! it for the whole step. This is second order in the step, and the loss is exactly the time integral of the reported
+//! flow. A long step is divided into shorter ones, so that a fast pulse is followed and a simulator may skip minutes.
 
-#[cfg(feature = "serialize")]
-use crate::synthesis::haemodynamics::saved::SavedBleeding;
 use crate::synthesis::haemodynamics::{BloodVolume, Clotting};
 use crate::synthesis::haemodynamics::{Circulation, EndSide, FlowError, Network, NetworkEnd, RootPressure};
 use crate::synthesis::tree::NodeId;
@@ -20,10 +18,10 @@ use crate::synthesis::units::{Flow, Pressure, Volume};
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct BleedingSettings {
-    /// How open ends close by themselves. `None` lets them bleed on.
+    /// How open ends clot. With `None` they never do.
     pub clotting: Option<Clotting>,
-    /// Longest step that is computed in one; a longer one is divided. A pulsatile pressure is taken at least
-    /// [`Self::SAMPLES_PER_BEAT`] times in a beat in any case.
+    /// Longest step that is not divided. A pulsatile pressure is always sampled at least [`Self::SAMPLES_PER_BEAT`]
+    /// times per beat.
     ///
     /// Lower values follow a pulse more closely and cost more.
     ///
@@ -49,20 +47,20 @@ impl Default for BleedingSettings {
     }
 }
 
-/// How an open end is.
+/// The state of an open end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum EndState {
     /// Blood leaves it.
     Bleeding,
-    /// It is open, and has no pressure to bleed: behind a clamp, or with too little in the bed.
+    /// It is open, but has too little pressure to bleed: behind a clamp, or with a low bed pressure.
     Dry,
-    /// It has closed by itself.
+    /// It has clotted.
     Clotted,
 }
 
-/// One open end as it bleeds.
+/// The bleeding of one open end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(deny_unknown_fields))]
@@ -72,7 +70,7 @@ pub struct BleedingEnd {
     pub node: NodeId,
     /// Which end of the gap.
     pub side: EndSide,
-    /// Where on the segment, as a share of the way from its parent.
+    /// Place on the segment, as a share of the way from its parent.
     pub along: f32,
     /// Seconds since it was opened.
     pub age: f64,
@@ -80,13 +78,13 @@ pub struct BleedingEnd {
     pub flow: Flow,
     /// Pressure in the vessel before the hole, at the end of the last step.
     pub pressure: Pressure,
-    /// Mean velocity in the hole in m/s, at the end of the last step: how fast a drop leaves.
+    /// Mean velocity in the hole in m/s, at the end of the last step: the speed at which a drop leaves.
     pub velocity: f64,
-    /// What it has lost since it was opened.
+    /// Volume lost since it was opened.
     pub lost: Volume,
-    /// How it is after the last step.
+    /// Its state after the last step.
     pub state: EndState,
-    /// Radius of its hole before clotting, in tissue lengths. A later cut makes another hole.
+    /// Radius of its hole before clotting, in tissue lengths. A later cut makes a new hole.
     radius: f32,
     /// Loss during this step, in m³.
     #[cfg_attr(feature = "serialize", serde(skip))]
@@ -123,7 +121,7 @@ impl BleedingEnd {
     }
 }
 
-/// An end that began or stopped to bleed.
+/// An end that began or stopped bleeding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct BleedingChange {
@@ -137,10 +135,8 @@ pub struct BleedingChange {
 
 /// The bleeding of one tree.
 ///
-/// To undo, keep a clone: it holds a hundred bytes for each open end, and nothing of the tree.
+/// To undo, keep a clone: it takes about a hundred bytes per open end, and holds nothing of the tree.
 #[derive(Clone, Debug, Default)]
-#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serialize", serde(into = "SavedBleeding", try_from = "SavedBleeding"))]
 pub struct Bleeding {
     pub(super) settings: BleedingSettings,
     /// In the order of the network's open ends.
@@ -148,7 +144,7 @@ pub struct Bleeding {
     changes: Vec<BleedingChange>,
     /// Seconds since the beginning.
     pub(super) time: f64,
-    /// Loss of all ends that there ever were, in m³.
+    /// Loss of all present and past ends, in m³.
     pub(super) lost: f64,
     /// Flow of all ends in the last part of a step, in m³/s.
     pub(super) rate: f64,
@@ -163,20 +159,19 @@ impl Bleeding {
     /// The bleeding of a tree that has lost nothing.
     ///
     /// # Errors
-    /// When a setting is outside its limits.
+    /// If a setting is outside its limits.
     pub fn new(settings: BleedingSettings) -> Result<Self, FlowError> {
         settings.validate()?;
         Ok(Self { settings, ..Self::default() })
     }
 
-    /// Bleeds for a time. 0 seconds only tell how fast the ends bleed now.
+    /// Bleeds for a time. With 0 seconds, only the present rates are computed.
     ///
-    /// Sets root and bed pressure of the network as its settings have them at the time, lowered by what the patient has
-    /// lost, and the openings of its ends. Then the network's open ends are solved; call [`Network::solve`] to have all
-    /// pressures.
+    /// Sets the network's root and bed pressure to those of its settings at this time, lowered by the patient's loss,
+    /// and the openings of its ends. Then the open ends are solved; call [`Network::solve`] for all pressures.
     ///
     /// # Errors
-    /// When the time is negative, not a number or above [`Self::LONGEST_TIME`], or the flow did not converge.
+    /// If the time is negative, NaN or above [`Self::LONGEST_TIME`], or the flow did not converge.
     pub fn step(&mut self, network: &mut Network, seconds: f64, blood: &mut BloodVolume) -> Result<(), FlowError> {
         let parts = self.begin(network, seconds)?;
         for _ in 0..parts {
@@ -189,8 +184,8 @@ impl Bleeding {
         Ok(())
     }
 
-    /// Bleeds arteries and veins that are joined, together: the first of the pair is the arteries'. Both networks are
-    /// solved altogether afterwards.
+    /// Bleeds joined arteries and veins together: the first of the pair is the arteries'. Both networks are completely
+    /// solved afterwards.
     ///
     /// # Errors
     /// As [`step`](Self::step).
@@ -220,12 +215,12 @@ impl Bleeding {
         &self.ends
     }
 
-    /// The ends that began or stopped to bleed in the last step, those among them that were closed.
+    /// The ends that began or stopped bleeding in the last step, including ends that were closed.
     pub fn changes(&self) -> &[BleedingChange] {
         &self.changes
     }
 
-    /// What the tree has lost through all ends that it ever had.
+    /// Loss of the tree through all present and past ends.
     pub fn lost(&self) -> Volume {
         Volume::from_cubic_metres(self.lost)
     }
@@ -240,13 +235,13 @@ impl Bleeding {
         self.time
     }
 
-    /// The settings it was made with.
+    /// The settings that it was made with.
     pub fn settings(&self) -> &BleedingSettings {
         &self.settings
     }
 
-    /// The same, to go on with in another world or with other listeners: ends that bleed are dry until the next step, which
-    /// tells that they bleed.
+    /// The same state, to continue in another world or with other readers: bleeding ends are dry until the next step,
+    /// which reports that they begin to bleed.
     #[must_use]
     pub fn resumed(mut self) -> Self {
         self.changes.clear();
@@ -256,7 +251,7 @@ impl Bleeding {
         self
     }
 
-    /// Begins a step: takes over new ends and drops closed ones. Returns in how many parts the step is to be made.
+    /// Begins a step: adds new ends and drops closed ones. Returns the number of parts of the step.
     fn begin(&mut self, network: &Network, seconds: f64) -> Result<u32, FlowError> {
         if !(0.0..=Self::LONGEST_TIME).contains(&seconds) {
             return Err(FlowError::Step { seconds });
@@ -276,11 +271,11 @@ impl Bleeding {
                 f64::from(self.settings.longest_step).min(pulse.period() / BleedingSettings::SAMPLES_PER_BEAT)
             }
         };
-        // A hair more than a whole number of parts is a rounding error.
+        // A tiny excess over a whole number of parts is a rounding error.
         Ok(((seconds / longest * (1.0 - 1e-9)).ceil() as u32).max(1))
     }
 
-    /// Takes over new ends and drops closed ones; both lists are in the order of their segments.
+    /// Adds new ends and drops closed ones; both lists are in the order of their segments.
     fn take_over(&mut self, open: &[NetworkEnd]) {
         let mut before = std::mem::take(&mut self.ends).into_iter().peekable();
         for end in open {
@@ -305,7 +300,7 @@ impl Bleeding {
         }
     }
 
-    /// Sets pressures and openings at the middle of a part of a step. `rate` is what the patient loses, in m³/s.
+    /// Sets pressures and openings at the middle of a part of a step. `rate` is the patient's loss in m³/s.
     fn prepare(&self, network: &mut Network, part: f64, rate: f64, blood: &BloodVolume) -> Result<(), FlowError> {
         let middle = 0.5 * part;
         let left = blood.pressure_share_after(rate * middle);

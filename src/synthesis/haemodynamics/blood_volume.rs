@@ -1,15 +1,13 @@
-//! How much blood a patient has left, and what its loss does to the pressure.
+//! The blood that a patient has left, and the effect of its loss on the pressure.
 //!
-//! The pressure keeps up while the body compensates, then falls ever faster: with f the share of the blood lost, it is
-//! 1 up to f₀, 1 − ((f − f₀)/(f₁ − f₀))² of itself up to f₁, and 0 beyond.
+//! The pressure holds while the body compensates, then falls ever faster: with f the share of the blood lost, its share
+//! is 1 up to f₀, 1 − ((f − f₀)/(f₁ − f₀))² up to f₁, and 0 beyond.
 //!
-//! Source: a loss below 15 % changes arterial pressure little, one of 15 to 40 % lowers it by its amount, more than 40 %
-//! is life-threatening (Klabunde, Cardiovascular Physiology Concepts, "Hemorrhagic Shock"); it falls to zero when 35 to
-//! 45 % are lost fast (Guyton & Hall, Textbook of Medical Physiology, chapter on circulatory shock). The parabola
-//! between is ours. Refilling from tissue takes hours and is left out.
+//! Source: a loss below 15 % changes arterial pressure little, one of 15 to 40 % lowers it according to its amount,
+//! more than 40 % is life-threatening (Klabunde, Cardiovascular Physiology Concepts, "Hemorrhagic Shock"); it falls to
+//! zero when 35 to 45 % are lost fast (Guyton & Hall, Textbook of Medical Physiology, chapter on circulatory shock).
+//! The parabola in between is our choice. Refilling from tissue takes hours and is not modelled.
 
-#[cfg(feature = "serialize")]
-use crate::synthesis::haemodynamics::saved::SavedBlood;
 use crate::synthesis::{haemodynamics::FlowError, units::Volume};
 
 /// Settings of a patient's blood.
@@ -18,17 +16,17 @@ use crate::synthesis::{haemodynamics::FlowError, units::Volume};
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct BloodVolumeSettings {
-    /// All the patient's blood before any loss.
+    /// The patient's blood volume before any loss.
     ///
-    /// Lower values, as in a child, make the same wound matter more.
+    /// Lower values, as in a child, make the same wound more severe.
     ///
     /// Limits: finite, > 0. Default: [`Self::DEFAULT_TOTAL`].
     pub total: Volume,
-    /// Whether a loss lowers the pressure. If not, the heart keeps it up whatever is lost.
+    /// Whether a loss lowers the pressure. If not, the pressure holds at any loss.
     ///
     /// Default: true.
     pub lowers_pressure: bool,
-    /// Share of the blood that can be lost without effect on the pressure.
+    /// Share of the blood that can be lost without an effect on the pressure.
     ///
     /// Limits: 0 to [`exhausted`](Self::exhausted). Default: [`Self::DEFAULT_COMPENSATED`].
     pub compensated: f32,
@@ -77,10 +75,8 @@ impl Default for BloodVolumeSettings {
     }
 }
 
-/// The blood of one patient, which all bleeding organs share.
+/// The blood of one patient, shared by all bleeding organs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serialize", serde(into = "SavedBlood", try_from = "SavedBlood"))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct BloodVolume {
     settings: BloodVolumeSettings,
@@ -92,24 +88,24 @@ impl BloodVolume {
     /// The blood of a patient who has lost none.
     ///
     /// # Errors
-    /// When a setting is outside its limits.
+    /// If a setting is outside its limits.
     pub fn new(settings: BloodVolumeSettings) -> Result<Self, FlowError> {
         settings.validate()?;
         Ok(Self { settings, lost: 0.0 })
     }
 
-    /// The settings it was made with.
+    /// The settings that it was made with.
     pub fn settings(&self) -> &BloodVolumeSettings {
         &self.settings
     }
 
-    /// What all wounds together have lost.
+    /// Total loss of all wounds.
     pub fn lost(&self) -> Volume {
         Volume::from_cubic_metres(self.lost)
     }
 
-    /// Share of the blood that is lost; above 1 if more bled than there was, which only happens while the loss doesn't
-    /// lower the pressure.
+    /// Share of the blood that is lost; above 1 if more was lost than there was, which can happen only if the loss
+    /// doesn't lower the pressure.
     pub fn lost_share(&self) -> f64 {
         self.lost / self.settings.total.cubic_metres()
     }
@@ -119,7 +115,7 @@ impl BloodVolume {
         self.settings.pressure_share(self.lost())
     }
 
-    /// Share of the pressure that is left when a volume in m³ more is lost.
+    /// Share of the pressure that is left after losing a further volume in m³.
     pub(super) fn pressure_share_after(&self, more: f64) -> f64 {
         self.settings.pressure_share(Volume::from_cubic_metres(self.lost + more))
     }
@@ -129,7 +125,7 @@ impl BloodVolume {
         self.lost += volume.cubic_metres();
     }
 
-    /// Gives blood back, at most what was lost.
+    /// Gives blood back, at most the lost volume.
     pub fn transfuse(&mut self, volume: Volume) {
         self.lost = (self.lost - volume.cubic_metres()).max(0.0);
     }

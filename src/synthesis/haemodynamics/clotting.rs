@@ -1,7 +1,7 @@
-//! How open ends close by themselves.
+//! Clotting of open ends.
 //!
-//! The open area of an end falls as e^(−t/τ) from when it was cut, and what is left at a small share closes at once.
-//! τ grows with a power of the diameter, and has two anchors:
+//! The open area of an end falls as e^(−t/τ) after the cut, and closes at once when a small share is left. τ grows with
+//! a power of the diameter, and is based on two references:
 //!
 //! - A sheep's carotid with a hole of 2.5 mm bleeds 400 mL/min at first, under 100 after 5 min, and stops near 17 min
 //!   (PMID 22166236). With τ = 213 s the area is 24 % after 5 min and 1 % after 16.3 min.
@@ -17,13 +17,13 @@ use bevy_math::ops;
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Clotting {
-    /// Time constant τ of a hole of [`Self::REFERENCE_DIAMETER`].
+    /// Time constant τ of a hole with [`Self::REFERENCE_DIAMETER`].
     ///
-    /// Higher values let wounds bleed for longer, as under anticoagulants.
+    /// Higher values let wounds bleed longer, as with anticoagulants.
     ///
     /// Units: seconds. Limits: finite, > 0. Default: [`Self::DEFAULT_TIME_CONSTANT`].
     pub time_constant: f32,
-    /// Power of the diameter that τ grows with.
+    /// Power of the diameter with which τ grows.
     ///
     /// Higher values make small vessels close sooner and large ones later; 0 closes all alike.
     ///
@@ -31,7 +31,7 @@ pub struct Clotting {
     pub calibre_exponent: f32,
     /// Share of the area at which the rest closes at once.
     ///
-    /// Lower values let an end trickle for longer.
+    /// Lower values let an end trickle longer.
     ///
     /// Limits: > 0, below 1. Default: [`Self::DEFAULT_SEALED_SHARE`].
     pub sealed_share: f32,

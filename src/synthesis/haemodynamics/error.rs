@@ -1,4 +1,4 @@
-//! Why blood can't be made to flow.
+//! Errors of the blood flow.
 
 use crate::synthesis::tree::TreeError;
 use crate::synthesis::units::ScaleError;
@@ -10,10 +10,10 @@ pub enum FlowError {
     /// The tree is not well formed.
     #[error(transparent)]
     Tree(#[from] TreeError),
-    /// A tissue length has no size.
+    /// A tissue length without a valid size.
     #[error(transparent)]
     Scale(#[from] ScaleError),
-    /// A number that is infinite or not a number.
+    /// A number that is infinite or NaN.
     #[error("{what} is {value}; it must be a finite number")]
     NotFinite {
         /// Which number.
@@ -29,7 +29,7 @@ pub enum FlowError {
         /// The value found.
         value: f64,
     },
-    /// A haematocrit that is no share.
+    /// A haematocrit that is not a valid share.
     #[error("the haematocrit is {haematocrit}; give a share from 0 to 0.95, such as 0.45")]
     Haematocrit {
         /// The value found.
@@ -71,26 +71,26 @@ pub enum FlowError {
         /// The one after it, not above it.
         node: u32,
     },
-    /// A root was to be interrupted.
+    /// An interruption of a root.
     #[error("node {node} is a root, which has no segment; interrupt the segments that end in its children")]
     NoSegment {
         /// The root.
         node: u32,
     },
     /// A node that is not in the network.
-    #[error("node {node} is not of this network of {nodes} nodes; update the network after its tree has grown")]
+    #[error("node {node} is not in this network of {nodes} nodes; update the network after its tree has grown")]
     NoSuchNode {
         /// The node.
         node: u32,
         /// Number of nodes.
         nodes: usize,
     },
-    /// Vessels joined through a bed without resistance.
+    /// Joining vessels through a bed without resistance.
     #[error(
         "the bed has no resistance; give it one, that of each link, before arteries and veins are joined through it"
     )]
     BedWithoutResistance,
-    /// A time that can't pass.
+    /// A step of an invalid duration.
     #[error(
         "a step of {seconds} s can't be made; give a number of seconds from 0 to a day, and longer times in several steps"
     )]
@@ -98,7 +98,7 @@ pub enum FlowError {
         /// The time given.
         seconds: f64,
     },
-    /// An iteration that did not reach its accuracy.
+    /// An iteration that did not converge.
     #[error(
         "{what} did not converge in {passes} passes: {residual:e} of the flow is out of balance; check for resistances that differ by more than ten orders of magnitude"
     )]
@@ -107,7 +107,7 @@ pub enum FlowError {
         what: &'static str,
         /// Passes made.
         passes: usize,
-        /// The imbalance that was left, relative to the flow.
+        /// The remaining imbalance, relative to the flow.
         residual: f64,
     },
 }

@@ -1,6 +1,6 @@
-//! Exponential and logarithm of `f64`, the same bits on every platform.
+//! Exponential and logarithm of `f64`, with the same bits on every platform.
 //!
-//! `bevy_math::ops` has them for `f32` alone, and std's differ between platforms. These use the four basic operations
+//! `bevy_math::ops` has them only for `f32`, and std's differ between platforms. These use the four basic operations
 //! and bits, which are exact everywhere. Their error is a few units in the last place.
 
 use bevy_math::ops;
@@ -13,7 +13,7 @@ pub(super) fn exp(x: f64) -> f64 {
     if x < -708.0 {
         return 0.0;
     }
-    // e^x = 2^k · e^r with |r| ≤ ln 2 / 2; ln 2 in two parts, so that k·ln 2 loses no digits.
+    // e^x = 2^k · e^r with |r| ≤ ln 2 / 2; ln 2 in two parts, so that k·ln 2 loses no accuracy.
     const LN_2_HIGH: f64 = 0.693_147_180_369_123_8;
     const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
     let k = (x * std::f64::consts::LOG2_E).round();
@@ -22,7 +22,7 @@ pub(super) fn exp(x: f64) -> f64 {
     power * (1.0 + small_exp_m1(r))
 }
 
-/// e^x − 1, exact near 0 too.
+/// e^x − 1, accurate near 0, too.
 pub(super) fn exp_m1(x: f64) -> f64 {
     if x.abs() < 0.35 { small_exp_m1(x) } else { exp(x) - 1.0 }
 }

@@ -1,8 +1,8 @@
-//! Which tissue gets blood: supply of every segment and of every vertex of the organ.
+//! Blood supply of every segment and of every vertex of the organ.
 //!
-//! The supply of a segment is the flow that reaches the bed through the terminals below it, over what reached it in the
-//! intact network: 1 where nothing has changed, 0 below a clamp. The supply of a vertex is that of the terminals next to
-//! it. A simulator colours by it, and scores how much tissue is left without.
+//! The supply of a segment is the flow that reaches the bed through the terminals below it, divided by that in the
+//! intact network: 1 without a change, 0 below a clamp. The supply of a vertex is that of the nearest terminals. A
+//! simulator uses it for colours and to score the amount of unsupplied tissue.
 
 use crate::synthesis::{
     haemodynamics::{FlowError, Network},
@@ -23,15 +23,16 @@ pub struct Supply {
 }
 
 impl Supply {
-    /// The supply of a network, compared with the same without interruptions at the mean of its settings' root pressure.
+    /// The supply of a network, relative to the same network without interruptions at the mean root pressure of its
+    /// settings.
     ///
-    /// Make it anew after the tree has grown.
+    /// Make it again after the tree has grown.
     ///
     /// # Errors
-    /// When the intact network can't be solved.
+    /// If the intact network can't be solved.
     ///
     /// # Panics
-    /// When the network is of another tree.
+    /// If the network is that of another tree.
     pub fn new(tree: &VesselTree, network: &Network) -> Result<Self, FlowError> {
         let mut intact = network.clone();
         intact.set_interruptions(&[])?;
@@ -41,19 +42,19 @@ impl Supply {
         Ok(Self::against(tree, &intact))
     }
 
-    /// The supply compared with that of a network as it is, which has been solved: for one that is joined with another,
-    /// before the first wound.
+    /// The supply relative to a solved network in its present state: for a network that is joined with another, call
+    /// this before the first wound.
     ///
     /// # Panics
-    /// When the network is of another tree.
+    /// If the network is that of another tree.
     pub fn against(tree: &VesselTree, intact: &Network) -> Self {
         at_once(Self::against_paced(tree, intact, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Panics
-    /// When the network is of another tree.
+    /// If the network is that of another tree.
     pub async fn against_paced(tree: &VesselTree, intact: &Network, pace: &Pace) -> Self {
         let mut flows: Vec<f64> = pace.collect(tree.len(), |node| intact.bed_flow(node)).await;
         tree.fold_to_roots(&mut flows, |parent, child| *parent += child);
@@ -62,19 +63,19 @@ impl Supply {
 
     /// Takes over the flows of a network that has been solved.
     ///
-    /// A terminal whose flow runs backwards counts as having none: what the bed gives back supplies no tissue. A segment
-    /// that never fed a terminal has nothing to lose, and counts as supplied.
+    /// A terminal with backward flow counts as having none, since blood from the bed supplies no tissue. A segment that
+    /// never fed a terminal counts as supplied.
     ///
     /// # Panics
-    /// When tree or network have another number of nodes than when this was made.
+    /// If tree or network have a different number of nodes than when this was made.
     pub fn update(&mut self, tree: &VesselTree, network: &Network) {
         at_once(self.update_paced(tree, network, &Pace::default()));
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Panics
-    /// When tree or network have another number of nodes than when this was made.
+    /// If tree or network have a different number of nodes than when this was made.
     pub async fn update_paced(&mut self, tree: &VesselTree, network: &Network, pace: &Pace) {
         let Self { intact, sums, segments } = self;
         assert_eq!(intact.len(), network.len(), "one network, that the supply was made for");
@@ -90,16 +91,16 @@ impl Supply {
         pace.part(0.5..1.0).each(tree.len(), share).await;
     }
 
-    /// Supply of every segment, from 0 to 1, by the node that it ends in.
+    /// Supply of every segment, from 0 to 1, by its end node.
     pub fn segments(&self) -> &[f32] {
         &self.segments
     }
 
-    /// Share of the bed, weighted by what each terminal fed, whose terminals have a supply below `threshold`; from 0 to
-    /// 1, and 0 for a tree without terminals.
+    /// Share of the bed whose terminals have a supply below `threshold`, weighted by each terminal's intact flow; from
+    /// 0 to 1, and 0 for a tree without terminals.
     ///
     /// # Panics
-    /// When the tree has another number of nodes than when this was made.
+    /// If the tree has a different number of nodes than when this was made.
     pub fn ischaemic_share(&self, tree: &VesselTree, threshold: f32) -> f32 {
         let (mut all, mut lacking) = (0.0, 0.0);
         for node in tree.tips() {
@@ -113,7 +114,7 @@ impl Supply {
     }
 }
 
-/// The terminals of a tree, and an index over where they are.
+/// The terminals of a tree, and an index over their positions.
 struct Terminals {
     boxes: PackedBoxes,
     /// Node and position of each slot.
@@ -134,8 +135,8 @@ impl Terminals {
         Self { boxes, slots }
     }
 
-    /// The terminals nearest to a point by squared distance, the nearest first; of equally near ones, those of the lower
-    /// nodes. Infinitely far where there is none, and for a point that is not finite.
+    /// The terminals nearest to a point with their squared distances, the nearest first; of equally near ones, the
+    /// lower nodes first. Infinitely far if there is none, or if the point is not finite.
     fn nearest(&self, point: Vec3) -> [(f32, u32); TissueSupply::NEAREST] {
         let mut found = [(f32::INFINITY, u32::MAX); TissueSupply::NEAREST];
         if point.is_finite() {
@@ -155,30 +156,29 @@ impl Terminals {
     }
 }
 
-/// Which terminals supply every vertex of an organ, and how much.
+/// The terminals that supply every vertex of an organ, with their weights.
 ///
-/// Built once for a tree and a mesh; then each update is a gather.
+/// Built once for a tree and a mesh. Each update only gathers values.
 #[derive(Clone, Debug, Default)]
 pub struct TissueSupply {
-    /// Terminals of every vertex, [`Self::NEAREST`] at most, with weights that add up to 1.
+    /// Terminals of every vertex, at most [`Self::NEAREST`], with weights that add up to 1.
     sources: Vec<[(u32, f32); Self::NEAREST]>,
     vertices: Vec<f32>,
 }
 
 impl TissueSupply {
-    /// Terminals that supply a vertex.
+    /// Number of terminals that supply a vertex.
     pub const NEAREST: usize = 4;
 
-    /// Finds the terminals next to every vertex; positions in tissue lengths.
+    /// Finds the terminals nearest to every vertex. Positions are in tissue lengths.
     ///
-    /// Their weights fall with the square of their distance, so that the supply is smooth between them. A tree without
-    /// terminals supplies no vertex, and a vertex that is not finite has no neighbours: both count as supplied, having
-    /// nothing to lose.
+    /// Their weights fall with the square of their distance, so that the supply is smooth between them. Vertices count
+    /// as supplied if the tree has no terminals or they are not finite.
     pub fn new(tree: &VesselTree, vertices: &[Vec3]) -> Self {
         at_once(Self::new_paced(tree, vertices, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub async fn new_paced(tree: &VesselTree, vertices: &[Vec3], pace: &Pace) -> Self {
         let terminals = Terminals::of(tree, &pace.part(0.0..0.2)).await;
         let mut supply =
@@ -189,7 +189,7 @@ impl TissueSupply {
                 let found = terminals.nearest(vertex);
                 let found = found.iter().filter(|(distance, _)| distance.is_finite());
                 let farthest = found.clone().map(|&(distance, _)| distance).fold(0.0, f32::max);
-                // Where a vertex lies on a terminal, that one supplies it nearly alone.
+                // A vertex that lies on a terminal is supplied almost only by it.
                 let weight = |distance: f32| 1.0 / (distance + 1e-6 * farthest).max(f32::MIN_POSITIVE);
                 let total: f64 = found.clone().map(|&(distance, _)| f64::from(weight(distance))).sum();
                 for (source, &(distance, node)) in sources.iter_mut().zip(found) {
@@ -204,7 +204,7 @@ impl TissueSupply {
     /// Takes over the supply of all segments, from [`Supply::segments`].
     ///
     /// # Panics
-    /// When there are fewer segments than when this was made.
+    /// If there are fewer segments than when this was made.
     pub fn update(&mut self, segments: &[f32]) {
         for (vertex, sources) in self.vertices.iter_mut().zip(&self.sources) {
             let lacking: f32 = sources
@@ -223,10 +223,10 @@ impl TissueSupply {
 
     /// Share of the tissue whose supply is below `threshold`, from 0 to 1; 0 for an organ without vertices.
     ///
-    /// `areas` says how much tissue each vertex stands for, in any unit. Without it all count alike.
+    /// `areas` gives the amount of tissue of each vertex, in any unit. Without it all count alike.
     ///
     /// # Panics
-    /// When there are areas, and not one per vertex.
+    /// If the number of areas differs from that of vertices.
     pub fn ischaemic_share(&self, threshold: f32, areas: Option<&[f32]>) -> f32 {
         assert!(areas.is_none_or(|areas| areas.len() == self.vertices.len()), "one area per vertex");
         let area = |vertex: usize| areas.map_or(1.0, |areas| f64::from(areas[vertex]));

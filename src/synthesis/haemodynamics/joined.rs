@@ -1,20 +1,20 @@
 //! Arteries and veins joined through the capillary bed.
 //!
 //! In: the networks of two trees, and the links between their nodes: each a stretch of bed with the bed's resistance.
-//! Out: both networks solved, so that what an artery gives into a link arrives in the vein. Terminals without a link
-//! drain into the bed's pool, as they do alone.
+//! Out: both networks solved, so that the flow from an artery into a link arrives in the vein. Terminals without a link
+//! drain into the bed's pool, as in a single network.
 //!
-//! The links make loops, so that no pair of sweeps solves both trees at once; but each alone is solved exactly. With T
-//! the matrix of a tree whose links end in a given pressure, and E that of the links between them, the arterial
-//! pressures obey (Tₐ − E·Tᵥ⁻¹·Eᵀ)·p = b. The matrix is symmetric and positive, and conjugate gradients preconditioned
-//! by Tₐ⁻¹ need one pair of sweeps of each tree in a pass: not of all its nodes, but of those that links and open ends sit
-//! at and of the forks between them, all else having been eliminated once. The error falls by the factor
-//! (1 − √(1 − c))/(1 + √(1 − c)) or better, where c < 1 is the largest share of a change of pressure that comes back through the links from the other
-//! side: few where the bed resists much, many where it hardly does. With two trees of 100,000 segments and 3,000 links it
-//! takes 12 passes where the bed takes about half of the pressure, 34 for a sixth of it, 81 for a thirtieth.
-//! The limit of passes is an error. From the last solution on it takes none where nothing has changed.
-//! A piece that hangs between links alone could have any pressure; a leak of 10⁻¹¹ of each link into the pool gives it
-//! the pool's. Open ends are solved for by Newton's method around it, as in a single tree.
+//! The links make loops, so no pair of sweeps solves both trees at once, but each alone is solved exactly. With T the
+//! matrix of a tree whose links end in a given pressure, and E that of the links between them, the arterial pressures
+//! satisfy (Tₐ − E·Tᵥ⁻¹·Eᵀ)·p = b. The matrix is symmetric and positive, and conjugate gradients preconditioned by Tₐ⁻¹
+//! need one pair of sweeps of each tree in a pass: not of all its nodes, but only of those with links and open ends and
+//! of the forks between them, since all others have been eliminated once. The error falls by the factor (1 − √(1 −
+//! c))/(1 + √(1 − c)) or better, where c < 1 is the largest share of a change of pressure that comes back through the
+//! links from the other side. A bed with high resistance takes few passes, one with low resistance many. With two trees
+//! of 100,000 segments and 3,000 links, it takes 12 passes if about half of the pressure drops in the bed, 34 for a
+//! sixth of it, 81 for a thirtieth. Reaching the limit of passes is an error. Starting from the last solution, it takes
+//! no pass if nothing has changed. A piece that only links connect could have any pressure; a leak of 10⁻¹¹ of each
+//! link into the pool gives it the pool's. Newton's method around this solves for open ends, as in a single tree.
 
 use super::{FlowError, Network, open_ends::OpenEnds, side::Side};
 use crate::synthesis::{
@@ -34,31 +34,31 @@ pub struct Circulation {
 }
 
 impl Circulation {
-    /// Passes of the conjugate gradients before they count as failed; ten to eighty are usual.
+    /// Passes of the conjugate gradients after which they count as failed; ten to eighty are usual.
     const MOST_PASSES: usize = 500;
-    /// Imbalance of a linked node, relative to the largest flow in a link, and correction of its pressure, relative to the
-    /// largest, at which they end.
+    /// Imbalance of a linked node, relative to the largest flow in a link, and correction of its pressure, relative to
+    /// the largest, at which the conjugate gradients end.
     const ACCURACY: f64 = 1e-12;
-    /// The same in the first round for the open ends, whose flow is a guess.
+    /// The same in the first round for the open ends, whose flow is still a guess.
     const FIRST_ACCURACY: f64 = 1e-4;
     /// Rounding of a pressure, relative to the largest.
     const ROUNDING: f64 = 1e-14;
-    /// Passes of Newton's method for the open ends before it counts as failed; some five are usual.
+    /// Passes of Newton's method for the open ends after which it counts as failed; some five are usual.
     const MOST_ROUNDS: usize = 60;
-    /// Those after which it is damped.
+    /// Passes after which it is damped.
     const UNDAMPED: usize = 20;
 
-    /// Joins two networks by links. A node may have several, and needs not be a terminal.
+    /// Joins two networks by links. A node may have several, and need not be a terminal.
     ///
-    /// The veins' bed takes on the resistance of the arteries', which is that of each link.
+    /// The veins' bed gets the resistance of the arteries', which is that of each link.
     ///
     /// # Errors
-    /// When a node is not of its network, or the arteries' bed has no resistance.
+    /// If a node is not in its network, or the arteries' bed has no resistance.
     pub fn new(arterial: Network, venous: Network, links: &[BedLink]) -> Result<Self, FlowError> {
         at_once(Self::new_paced(arterial, venous, links, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -77,10 +77,10 @@ impl Circulation {
         Ok(circulation)
     }
 
-    /// Joins the networks by other links, as after growth: update both networks first.
+    /// Replaces the links, for example after growth: update both networks first.
     ///
     /// # Errors
-    /// When a node is not of its network. The links are as before, then.
+    /// If a node is not in its network. The links are unchanged then.
     pub fn set_links(&mut self, links: &[BedLink]) -> Result<(), FlowError> {
         at_once(self.set_links_paced(links, &Pace::default()))
     }
@@ -103,7 +103,7 @@ impl Circulation {
         &self.arterial
     }
 
-    /// The arteries, to be wounded or driven by another pressure.
+    /// The arteries, to change interruptions or pressures.
     pub fn arterial_mut(&mut self) -> &mut Network {
         &mut self.arterial
     }
@@ -113,7 +113,7 @@ impl Circulation {
         &self.venous
     }
 
-    /// The veins, to be wounded or driven by another pressure.
+    /// The veins, to change interruptions or pressures.
     pub fn venous_mut(&mut self) -> &mut Network {
         &mut self.venous
     }
@@ -128,7 +128,7 @@ impl Circulation {
         self.passes
     }
 
-    /// Gives the two networks back, apart again.
+    /// Returns the two networks, separated again.
     pub fn into_networks(mut self) -> [Network; 2] {
         for network in [&mut self.arterial, &mut self.venous] {
             at_once(network.set_links(std::iter::empty(), &Pace::default()));
@@ -136,19 +136,19 @@ impl Circulation {
         [self.arterial, self.venous]
     }
 
-    /// Brings pressures and flows of both networks up to date, those at open ends too.
+    /// Brings pressures and flows of both networks up to date, including those at open ends.
     ///
-    /// Costs two pairs of sweeps over both trees, one more where trees, links or gaps have changed, and for each pass of
-    /// the conjugate gradients a pair of sweeps over what joins the links in each tree; some five times as many passes
-    /// where there are open ends, less where little has changed since the last time.
+    /// The cost is two pairs of sweeps over both trees, one more if trees, links or gaps have changed, and for each
+    /// pass of the conjugate gradients a pair of sweeps over the joints of the links in each tree. With open ends there
+    /// are about five times as many passes, fewer if little has changed since the last time.
     ///
     /// # Errors
-    /// When one of the iterations did not converge.
+    /// If one of the iterations did not converge.
     pub fn solve(&mut self) -> Result<(), FlowError> {
         at_once(self.solve_paced(&Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`solve`](Self::solve).
@@ -177,8 +177,8 @@ impl Circulation {
             if residual <= 1.0 && accuracy == Self::ACCURACY {
                 return self.finish(&driving).await;
             }
-            // Newton's method squares the error, so that a round needs to be no more exact than that. Ends that let out
-            // very little ask for more.
+            // Newton's method squares the error, so a round needs no more accuracy than that. Ends with very little
+            // flow need more.
             let expected = residual * OpenEnds::ACCURACY;
             accuracy = (expected * expected).min(1e-3 * accuracy).clamp(Self::ACCURACY, Self::FIRST_ACCURACY);
         }
@@ -187,14 +187,14 @@ impl Circulation {
         Err(FlowError::NotConverged { what, passes: Self::MOST_ROUNDS, residual })
     }
 
-    /// Both count pressures from that of the same pool.
+    /// Makes pressures of both relative to the same pool.
     fn share_bed_pressure(&mut self) {
         let moved = self.venous.bed - self.arterial.bed;
         self.venous.source += moved;
         self.venous.bed = self.arterial.bed;
     }
 
-    /// Turns the ends' tangents into what they draw, and solves with that once more.
+    /// Replaces the ends' tangents by their draw, and solves once more.
     async fn finish(&mut self, pace: &Pace) -> Result<(), FlowError> {
         let [arteries, veins] = &self.sides;
         self.arterial.finish_ends(&arteries.quotient);
@@ -204,7 +204,7 @@ impl Circulation {
         Ok(())
     }
 
-    /// Finds the pressures at links and open ends, with the ends as they are linearised.
+    /// Finds the pressures at links and open ends, with linearised ends.
     async fn balance(&mut self, accuracy: f64, pace: &Pace) -> Result<(), FlowError> {
         self.sides[0].quotient.eliminate(&self.arterial.ends);
         self.sides[1].quotient.eliminate(&self.venous.ends);
@@ -219,19 +219,20 @@ impl Circulation {
         Ok(())
     }
 
-    /// Solves both networks as a whole, from the pressures at the links.
+    /// Solves both whole networks from the pressures at the links.
     async fn drive(&mut self, pace: &Pace) {
         let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
         let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
         veins.carry(arteries, *conductance, &arteries.pressures, &mut into_veins);
         veins.drive(venous, &into_veins, &pace.part(0.0..0.5)).await;
-        let pressures: Vec<f64> = veins.slots.iter().map(|&slot| venous.slots[slot as usize].pressure).collect();
+        let pressures: Vec<f64> =
+            veins.slots.iter().map(|&slot| venous.circuit.slots[slot as usize].pressure).collect();
         arteries.carry(veins, *conductance, &pressures, &mut into_arteries);
         arteries.drive(arterial, &into_arteries, &pace.part(0.5..1.0)).await;
     }
 
-    /// Solves each tree once from the last solution. Returns the arterial pressures at the links, the imbalance left
-    /// there, and how much of it is tolerated.
+    /// Solves each tree once from the last solution. Returns the arterial pressures at the links, the remaining
+    /// imbalance there, and its tolerance.
     fn begin_from_last(&mut self, accuracy: f64) -> (Vec<f64>, Vec<f64>, Tolerated) {
         let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
         let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
@@ -294,8 +295,8 @@ impl Circulation {
         Ok(passes)
     }
 
-    /// What is small enough: an imbalance relative to the largest flow in a link, and a correction relative to the
-    /// pressures, or as much as rounding of the pressures makes of them.
+    /// The tolerance: an imbalance relative to the largest flow in a link, and a correction relative to the pressures,
+    /// but at least the effect of rounding of the pressures.
     fn tolerated(&self, accuracy: f64, arterial: &[f64], venous: &[f64]) -> Tolerated {
         let [arteries, veins] = &self.sides;
         let links = arteries.of_links.iter().zip(&veins.of_links);
@@ -306,7 +307,7 @@ impl Circulation {
     }
 }
 
-/// How far from the solution conjugate gradients may end.
+/// Tolerance of the conjugate gradients.
 struct Tolerated {
     /// Relative.
     accuracy: f64,

@@ -1,48 +1,49 @@
 //! Blood flow: pressure, flow, velocity and wall shear stress in every segment of a tree.
 //!
-//! In: a [`VesselTree`](crate::synthesis::tree::VesselTree), [`FlowSettings`] and the [`Interruption`]s that cuts and
-//! clamps made. Out: a [`Network`] that holds pressures and flows by node, and the flow at every [`NetworkEnd`].
+//! In: a [`VesselTree`](crate::synthesis::tree::VesselTree), [`FlowSettings`] and the [`Interruption`]s of cuts and
+//! clamps. Out: a [`Network`] that holds pressures and flows by node, and the flow at every [`NetworkEnd`].
 //!
 //! # Model
 //!
-//! Steady laminar flow: a segment of length L and radius r drops the pressure by Δp = R·Q with R = 8µL/(πr⁴), the law of
-//! Hagen and Poiseuille, and at every node as much arrives as leaves. A segment has one radius, that which the tree
-//! stores for its end node. Roots are held at the root pressure, terminals drain into the bed.
+//! Flow is steady and laminar: a segment of length L and radius r drops the pressure by Δp = R·Q with R = 8µL/(πr⁴)
+//! (the law of Hagen and Poiseuille), and flow is conserved at every node. A segment has one radius, stored in the tree
+//! for its end node. Roots are held at the root pressure, terminals drain into the bed.
 //!
-//! A tree of resistances is solved exactly in two sweeps. Seen from its upper end, all that hangs below a segment draws
-//! the current Y·p − S at the pressure p. From the tips to the roots these add up: with Y and S the sums at a node, the
+//! A tree of resistances is solved exactly in two sweeps. At its upper end, everything below a segment draws the
+//! current Y·p − S at the pressure p. From the tips to the roots these add up: with Y and S the sums at a node, the
 //! segment above it passes on Y/(1 + R·Y) and S/(1 + R·Y). From the roots to the tips, they give the node the pressure
-//! (p + R·S)/(1 + R·Y).
-//! Pressures are counted from the bed's, so that S is zero but for wounds and links, and every step adds and divides
-//! positive numbers: nothing cancels, whatever the range of the radii.
+//! (p + R·S)/(1 + R·Y). Pressures are relative to the bed's, so S is zero except for wounds and links, and every step
+//! adds and divides positive numbers: nothing cancels, for any range of radii.
 //!
 //! # Wounds
 //!
-//! A cut or a clamp never changes a tree. It is an [`Interruption`] laid over it: the segment no longer conducts, and
-//! each of its ends is closed, or open to the outside through an [`Outlet`]. What an open end lets out follows from the
-//! network's resistance and the orifice's in series: with Δp from the node before it to the outside, R the resistance of
-//! the piece between, C the discharge coefficient and A the open area,
+//! A cut or a clamp never changes a tree. It is an [`Interruption`] laid over it: the segment doesn't conduct, and each
+//! of its ends is closed, or open to the outside through an [`Outlet`]. The flow of an open end results from the
+//! network's resistance and the orifice's in series: with Δp from the node before it to the outside, R the resistance
+//! of the piece between, C the discharge coefficient and A the open area,
 //!
 //! Δp = R·Q + K·Q², K = ρ/(2·C²·A²).
 //!
-//! The second term alone is the orifice law Q = C·A·√(2Δp/ρ), the first alone is Poiseuille's: the flow is above
-//! neither, and near the smaller one where they differ much. Nothing is drawn in from outside: where the pressure in
-//! the vessel is lower, the end collapses. Ends that share vessels rob each other of pressure; `open_ends.rs` solves for
-//! them all together.
+//! The second term alone is the orifice law Q = C·A·√(2Δp/ρ), the first alone is Poiseuille's: the flow exceeds
+//! neither, and is near the smaller one if they differ much. Nothing is drawn in from outside: if the pressure in the
+//! vessel is lower, the end collapses. Ends that share vessels lower each other's pressure; `open_ends.rs` solves for
+//! all of them together.
 //!
 //! # Cost
 //!
-//! A change of one segment is carried along its path to the root alone. Pressures at open ends need no sweep over the
-//! tree, either.
+//! A change of one segment updates only its path to the root. Pressures at open ends need no sweep over the tree,
+//! either.
 //!
 //! Source: Poiseuille networks as in Pries et al. (1994) and Rauch & Harders (2021); the orifice law with the
 //! coefficient of PMID 22166236.
 
 pub mod bleeding;
 pub mod blood_volume;
+mod circuit;
 pub mod clotting;
 mod error;
 mod exponential;
+mod gaps;
 mod interruption;
 pub mod ischaemia;
 mod joined;

@@ -1,89 +1,38 @@
 //! A tree as a network of resistances, kept up to date with the tree.
-//!
-//! The network has two slots more than the tree has nodes: slot 0 is the reference, held at the bed's pressure, from
-//! which pressures are counted; slot 1 is the source, held at the root pressure, and the parent of every root. So every
-//! slot has one above it, and no loop asks whether a node is a root or cut off.
 
-use super::{FlowError, FlowSettings, Interruption, open_ends::OpenEnds};
+use super::{
+    EndSide, FlowError, FlowSettings, Interruption, NetworkEnd,
+    circuit::{CLOSED, Circuit, FIRST, REFERENCE, SOURCE, Shunt, node_slot, slot_of},
+    open_ends::OpenEnds,
+};
 use crate::synthesis::pace::{Pace, at_once};
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use crate::synthesis::units::Pressure;
 
-/// Slot held at the bed's pressure. Also stands for "none" in lists of slots.
-pub(super) const REFERENCE: u32 = 0;
-/// Slot held at the root pressure.
-pub(super) const SOURCE: u32 = 1;
-/// Slots before that of node 0.
-pub(super) const FIRST: usize = 2;
-
-/// Resistance that lets nothing through. Far from the ends of `f64`, so that products with it stay finite.
-pub(super) const CLOSED: f64 = 1e200;
-
 /// Conductance of a bed that holds its terminal at its own pressure, in conductances of the terminal's segment. Large
-/// enough that 1 + HELD is HELD in `f64`: it makes no difference to infinity, and needs no case of its own.
+/// enough that 1 + HELD is HELD in `f64`: it acts like infinity, without a case of its own.
 const HELD: f64 = (1u64 << 60) as f64;
 
-/// What leaks from a link into the bed's pool, in conductances of the link. It holds pieces that hang between links
-/// alone, and is lost among the digits of every flow.
+/// Leak from a link into the bed's pool, in conductances of the link. It fixes the pressure of pieces that only links
+/// connect, and is below the accuracy of every flow.
 const LEAK: f64 = 1e-11;
 
-/// Least length of a segment, in its radii. A segment of no length is a joint; this keeps its conductance finite.
+/// Least length of a segment, in its radii, which keeps the conductance of a segment of zero length finite.
 const LEAST_LENGTH: f64 = 1e-6;
 
-/// Where a slot stands in the tree.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Link {
-    /// The slot that the segment draws from: the parent, or the reference where the segment is interrupted.
-    pub upstream: u32,
-    /// The parent's slot, whether the segment is interrupted or not.
-    pub parent: u32,
-    /// Child of the highest index, or none.
-    pub first_child: u32,
-    /// The parent's next child in falling order of the index, or none.
-    pub next_sibling: u32,
-}
-
-/// A current Y·p − S that leaves a node of pressure p.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Shunt {
-    /// Conductance, in m³/(s·Pa).
-    pub y: f64,
-    /// Current at pressure 0 with its sign turned, in m³/s.
-    pub s: f64,
-}
-
-impl Shunt {
-    /// The same current, by pressures that count from one of `pressure`.
-    pub fn counted_from(self, pressure: f64) -> Self {
-        Self { y: self.y, s: self.s - self.y * pressure }
-    }
-}
-
-/// State of a segment and the node that it ends in.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Slot {
-    /// Resistance of the segment, in Pa·s/m³.
-    pub resistance: f64,
-    /// All that leaves the node downwards.
-    pub below: Shunt,
-    /// 1/(1 + R·Y): share of `below` that the segment passes on.
-    pub through: f64,
-    /// Pressure of the node above the bed's, in Pa, as of the last solution.
-    pub pressure: f64,
-}
-
-/// What [`Network::update`] found.
+/// The result of [`Network::update`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NetworkUpdate {
-    /// Nodes that are new.
+    /// Number of new nodes.
     pub appended: usize,
-    /// Segments whose radius or length changed.
+    /// Number of segments whose radius or length changed.
     pub changed: usize,
-    /// Whether the tree is another one, not the old one grown on: the network was made anew, without interruptions.
+    /// Whether the tree is another one, rather than the old one grown further. Then the network was made again, without
+    /// interruptions.
     pub replaced: bool,
 }
 
-/// The network of resistances of one tree, with its wounds and its solution.
+/// The network of resistances of one tree, with its interruptions and its solution.
 #[derive(Clone, Debug)]
 pub struct Network {
     pub(super) settings: FlowSettings,
@@ -91,27 +40,22 @@ pub struct Network {
     pub(super) lengths: Vec<f64>,
     /// 8µ/(πr⁴) of every node's segment.
     pub(super) per_length: Vec<f64>,
-    pub(super) links: Vec<Link>,
-    pub(super) slots: Vec<Slot>,
-    /// The bed below each slot's node.
-    pub(super) beds: Vec<Shunt>,
-    /// Links that join each node to another network; empty where none is.
+    pub(super) circuit: Circuit,
+    /// Number of links that join each node to another network; empty without links.
     pub(super) link_counts: Vec<u32>,
-    /// The bed, and the open ends as of the last solution.
-    pub(super) shunts: Vec<Shunt>,
-    /// Root pressure above the bed's, in Pa.
+    /// Root pressure relative to the bed's, in Pa.
     pub(super) source: f64,
     /// Pressure of the bed, in Pa.
     pub(super) bed: f64,
-    /// In the order of the node.
+    /// In the order of their nodes.
     pub(super) interruptions: Vec<(u32, Interruption)>,
     pub(super) ends: OpenEnds,
     pub(super) pressures: Vec<f64>,
     pub(super) flows: Vec<f64>,
-    /// Whether `below` and `through` have to be summed again from all tips.
+    /// Whether `below` and `through` must be summed again from all tips.
     pub(super) sums_stale: bool,
     pub(super) path: Vec<u32>,
-    /// Rises with every change of the tree, its gaps and what its nodes drain into.
+    /// Rises with every change of the tree, its gaps and its beds.
     pub(super) revision: u64,
 }
 
@@ -119,12 +63,12 @@ impl Network {
     /// The network of a tree, not solved yet, at the mean of the root pressure.
     ///
     /// # Errors
-    /// When the tree is not well formed, or a setting is outside its limits.
+    /// If the tree is not well formed, or a setting is outside its limits.
     pub fn new(tree: &VesselTree, settings: FlowSettings) -> Result<Self, FlowError> {
         at_once(Self::new_paced(tree, settings, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -138,11 +82,8 @@ impl Network {
             radii: Vec::new(),
             lengths: Vec::new(),
             per_length: Vec::new(),
-            links: Vec::new(),
-            slots: Vec::new(),
-            beds: Vec::new(),
+            circuit: Circuit::default(),
             link_counts: Vec::new(),
-            shunts: Vec::new(),
             interruptions: Vec::new(),
             ends: OpenEnds::default(),
             pressures: Vec::new(),
@@ -157,15 +98,15 @@ impl Network {
         Ok(network)
     }
 
-    /// Follows a tree that grew, whose radii changed or whose nodes moved. Only what changed is computed again.
+    /// Follows a tree that grew, whose radii changed or whose nodes moved. Only changes are computed again.
     ///
     /// # Errors
-    /// When a number of the tree is not finite, or a radius not above 0. The network is as before, then.
+    /// If a number of the tree is not finite, or a radius not above 0. The network is unchanged then.
     pub fn update(&mut self, tree: &VesselTree) -> Result<NetworkUpdate, FlowError> {
         tree.validate()?;
         let before = self.len();
         let goes_on = before <= tree.len()
-            && (0..before).all(|node| slot_of(tree.parents()[node]) == self.links[node + FIRST].parent);
+            && (0..before).all(|node| slot_of(tree.parents()[node]) == self.circuit.links[node + FIRST].parent);
         if !goes_on {
             self.clear();
             at_once(self.append(tree, &Pace::default()));
@@ -202,27 +143,15 @@ impl Network {
         self.interruptions.clear();
         self.ends.clear();
         self.link_counts.clear();
-        self.links.clear();
-        self.links.resize(FIRST, Link::default());
-        self.slots.clear();
-        self.slots.resize(FIRST, Slot::default());
-        for shunts in [&mut self.beds, &mut self.shunts] {
-            shunts.clear();
-            shunts.resize(FIRST, Shunt::default());
-        }
+        self.circuit.clear();
     }
 
-    /// Takes over the nodes that the tree has more.
+    /// Adds the tree's new nodes.
     async fn append(&mut self, tree: &VesselTree, pace: &Pace) {
         let before = self.len();
         let add = |number: usize| {
             let node = before + number;
-            let (slot, parent) = (node + FIRST, slot_of(tree.parents()[node]));
-            let next_sibling = std::mem::replace(&mut self.links[parent as usize].first_child, slot as u32);
-            self.links.push(Link { upstream: parent, parent, first_child: REFERENCE, next_sibling });
-            self.slots.push(Slot::default());
-            self.beds.push(Shunt::default());
-            self.shunts.push(Shunt::default());
+            self.circuit.push(slot_of(tree.parents()[node]));
             self.radii.push(0.0);
             self.per_length.push(0.0);
             let length = self.length_in(tree, node);
@@ -230,11 +159,11 @@ impl Network {
             self.set_radius(node, tree.radii()[node]);
         };
         pace.part(0.0..0.8).each(tree.len() - before, add).await;
-        // After all links, which say what is a terminal and no longer is one.
+        // After all links of nodes, which decide whether a node is a terminal.
         let measure = |number: usize| {
             let node = before + number;
             self.set_resistance(node);
-            if let Some(parent) = (self.links[node + FIRST].parent as usize).checked_sub(FIRST) {
+            if let Some(parent) = (self.circuit.links[node + FIRST].parent as usize).checked_sub(FIRST) {
                 self.set_bed(parent);
             }
         };
@@ -263,24 +192,24 @@ impl Network {
 
     /// Resistance of a node's segment while it is whole, in Pa·s/m³; 0 for a root.
     pub(super) fn whole_resistance(&self, node: usize) -> f64 {
-        if self.links[node + FIRST].parent == SOURCE {
+        if self.circuit.links[node + FIRST].parent == SOURCE {
             return 0.0;
         }
         let least = LEAST_LENGTH * self.settings.scale.to_metres(self.radii[node]);
-        // At least so much that its inverse stays finite, at most what lets nothing through.
+        // At least large enough for a finite inverse, at most the resistance that lets nothing through.
         (self.per_length[node] * self.lengths[node].max(least)).clamp(1.0 / CLOSED, CLOSED)
     }
 
     fn set_resistance(&mut self, node: usize) {
-        let is_whole = self.links[node + FIRST].upstream != REFERENCE;
-        self.slots[node + FIRST].resistance = if is_whole { self.whole_resistance(node) } else { CLOSED };
+        let is_whole = self.circuit.links[node + FIRST].upstream != REFERENCE;
+        self.circuit.slots[node + FIRST].resistance = if is_whole { self.whole_resistance(node) } else { CLOSED };
         self.set_bed(node);
     }
 
-    /// What a node drains into: its links, or the pool if it is a terminal without any. A root without children is no
+    /// Sets a node's bed: its links, or the pool if it is a terminal without links. A root without children is no
     /// terminal.
     pub(super) fn set_bed(&mut self, node: usize) {
-        let link = self.links[node + FIRST];
+        let link = self.circuit.links[node + FIRST];
         let is_terminal = link.first_child == REFERENCE && link.parent != SOURCE;
         let links = self.link_counts.get(node).copied().unwrap_or(0);
         let y = match self.settings.bed.resistance {
@@ -291,8 +220,35 @@ impl Network {
             Some(resistance) => 1.0 / resistance.pascal_seconds_per_cubic_metre(),
             None => HELD / self.whole_resistance(node),
         };
-        self.beds[node + FIRST] = Shunt { y, s: 0.0 };
-        self.shunts[node + FIRST] = self.beds[node + FIRST];
+        self.circuit.beds[node + FIRST] = Shunt { y, s: 0.0 };
+        self.circuit.shunts[node + FIRST] = self.circuit.beds[node + FIRST];
+    }
+
+    /// Measures all ends again, after segments changed.
+    pub(super) fn measure_ends(&mut self) {
+        for index in 0..self.ends.all().len() {
+            self.measure_end(index);
+        }
+        self.ends.is_untraced = true;
+    }
+
+    /// Measures the ends of one segment.
+    pub(super) fn measure_ends_of(&mut self, node: NodeId) {
+        for index in self.ends.indices_of(node) {
+            self.measure_end(index);
+        }
+    }
+
+    fn measure_end(&mut self, index: usize) {
+        let NetworkEnd { node, side, along, .. } = self.ends.all()[index];
+        let whole = self.whole_resistance(node.index());
+        let slot = node_slot(node.index());
+        let (attached, share) = match side {
+            EndSide::Proximal => (self.circuit.links[slot].parent, along),
+            EndSide::Distal => (slot as u32, 1.0 - along),
+        };
+        let discharge = f64::from(self.settings.discharge_coefficient);
+        self.ends.all_mut()[index].measure(attached, whole * f64::from(share), self.settings.scale, discharge);
     }
 
     /// Number of nodes.
@@ -305,7 +261,7 @@ impl Network {
         self.radii.is_empty()
     }
 
-    /// The settings it was made with.
+    /// The settings that it was made with.
     pub fn settings(&self) -> &FlowSettings {
         &self.settings
     }
@@ -313,7 +269,7 @@ impl Network {
     /// Holds all roots at a pressure from now on.
     ///
     /// # Errors
-    /// When the pressure is not finite.
+    /// If the pressure is not finite.
     pub fn set_root_pressure(&mut self, pressure: Pressure) -> Result<(), FlowError> {
         FlowError::check_finite("the root pressure in mmHg", pressure.mmhg())?;
         self.source = pressure.pascals() - self.bed;
@@ -324,7 +280,7 @@ impl Network {
     /// Holds the bed's pool at a pressure from now on, other than that of the settings.
     ///
     /// # Errors
-    /// When the pressure is not finite.
+    /// If the pressure is not finite.
     pub fn set_bed_pressure(&mut self, pressure: Pressure) -> Result<(), FlowError> {
         FlowError::check_finite("the bed's pressure in mmHg", pressure.mmhg())?;
         self.source += self.bed - pressure.pascals();
@@ -333,28 +289,23 @@ impl Network {
         Ok(())
     }
 
-    /// The pressure that the bed's pool is held at.
+    /// The pressure of the bed's pool.
     pub fn bed_pressure(&self) -> Pressure {
         Pressure::from_pascals(self.bed)
     }
 
-    /// The pressure that roots are held at.
+    /// The pressure of all roots.
     pub fn root_pressure(&self) -> Pressure {
         Pressure::from_pascals(self.source + self.bed)
     }
 
-    /// Checks that a node is there.
+    /// Pressure outside, relative to the bed's.
+    pub(super) fn ambient(&self) -> f64 {
+        self.settings.ambient.pascals() - self.bed
+    }
+
+    /// Checks that a node exists.
     pub(super) fn check(&self, node: NodeId) -> Result<(), FlowError> {
         if node.index() < self.len() { Ok(()) } else { Err(FlowError::NoSuchNode { node: node.0, nodes: self.len() }) }
     }
-}
-
-/// Slot of a node, or of the source for a root's missing parent.
-fn slot_of(node: u32) -> u32 {
-    if node == NO_PARENT { SOURCE } else { node + FIRST as u32 }
-}
-
-/// Slot of a node.
-pub(super) fn node_slot(node: usize) -> usize {
-    node + FIRST
 }

@@ -1,8 +1,8 @@
-//! Open ends, and how much they let out.
+//! Open ends and their flow.
 
 use super::{
-    FlowError, Network, Outlet,
-    network::{Shunt, node_slot},
+    FlowError, Outlet,
+    circuit::{Circuit, Shunt},
     skeleton::Skeleton,
 };
 use crate::synthesis::pace::{Pace, at_once};
@@ -15,9 +15,9 @@ use std::ops::Range;
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub enum EndSide {
-    /// The end towards the root: it bleeds what the root drives.
+    /// The end towards the root: the root drives its bleeding.
     Proximal,
-    /// The end towards the terminals: it bleeds back what the bed drives.
+    /// The end towards the terminals: the bed drives its back-bleeding.
     Distal,
 }
 
@@ -28,13 +28,13 @@ pub struct NetworkEnd {
     pub node: NodeId,
     /// Which end of the gap.
     pub side: EndSide,
-    /// Where on the segment, as a share of the way from its parent.
+    /// Place on the segment, as a share of the way from its parent.
     pub along: f32,
     /// The hole.
     pub outlet: Outlet,
     /// Share of the hole's area that clotting has left open.
     pub opening: f64,
-    /// What leaves through it, in m³/s.
+    /// Flow through it, in m³/s.
     pub(super) flow: f64,
     /// Pressure in the vessel before the hole, in Pa.
     pressure: f64,
@@ -48,7 +48,7 @@ pub struct NetworkEnd {
     orifice: f64,
     /// The joint of the skeleton at the node.
     joint: u32,
-    /// What the end draws from the node, as of the last solution.
+    /// The end's draw from the node, as of the last solution.
     pub(super) stump: Shunt,
 }
 
@@ -72,7 +72,7 @@ impl NetworkEnd {
         }
     }
 
-    /// What leaves through it; never negative.
+    /// Flow through it; never negative.
     pub fn flow(&self) -> Flow {
         Flow::from_cubic_metres_per_second(self.flow)
     }
@@ -82,7 +82,7 @@ impl NetworkEnd {
         Pressure::from_pascals(self.pressure)
     }
 
-    /// Mean velocity in the hole, in m/s; 0 for one that has closed.
+    /// Mean velocity in the hole, in m/s; 0 if it has closed.
     pub fn velocity(&self) -> f64 {
         if self.flow > 0.0 { self.flow / (self.area * self.opening) } else { 0.0 }
     }
@@ -91,13 +91,13 @@ impl NetworkEnd {
         self.side == EndSide::Proximal
     }
 
-    /// Whether it is the same hole, not one that a later cut made on the same segment.
+    /// Whether it is the same hole, not that of a later cut of the same segment.
     fn is_same(&self, other: &Self) -> bool {
         (self.node, self.side, self.along, self.outlet) == (other.node, other.side, other.along, other.outlet)
     }
 
-    /// Sets what follows from the segment and the hole.
-    fn measure(&mut self, attached: u32, piece: f64, scale: Scale, discharge: f64) {
+    /// Sets the values that depend on the segment and the hole.
+    pub(super) fn measure(&mut self, attached: u32, piece: f64, scale: Scale, discharge: f64) {
         let radius = scale.to_metres(self.outlet.radius);
         self.area = std::f64::consts::PI * radius * radius;
         let passing = discharge * self.area;
@@ -106,12 +106,19 @@ impl NetworkEnd {
         self.piece = piece;
     }
 
-    /// K of what is open of the hole.
+    /// Adds its draw to the shunt of its node.
+    fn draw_from(&self, circuit: &mut Circuit) {
+        let shunt = &mut circuit.shunts[self.attached as usize];
+        shunt.y += self.stump.y;
+        shunt.s += self.stump.s;
+    }
+
+    /// K of the open part of the hole.
     fn narrowed(&self) -> f64 {
         self.orifice / (self.opening * self.opening)
     }
 
-    /// The flow that a difference of pressure drives through piece and hole: Δ = R·Q + K·Q².
+    /// The flow through piece and hole at a difference of pressure: Δ = R·Q + K·Q².
     fn driven(&self, difference: f64) -> f64 {
         if !(difference > 0.0 && self.opening > 0.0) {
             return 0.0;
@@ -124,30 +131,34 @@ impl NetworkEnd {
 /// All open ends of a network.
 #[derive(Clone, Debug, Default)]
 pub(super) struct OpenEnds {
-    /// In the order of the node, proximal before distal.
+    /// In the order of their nodes, proximal before distal.
     list: Vec<NetworkEnd>,
-    pub skeleton: Skeleton,
-    /// Whether the skeleton has to be traced again.
+    skeleton: Skeleton,
+    /// Whether the skeleton must be traced again.
     pub is_untraced: bool,
-    /// Whether flows have to be solved for again.
+    /// Whether flows must be solved again.
     pub is_unsolved: bool,
-    /// Whether the network's sums don't have the flows yet.
+    /// Whether the flows are missing in the network's sums.
     is_unloaded: bool,
 }
 
 impl OpenEnds {
-    /// Passes after which an iteration that circles is damped.
+    /// Passes after which the iteration is damped, in case it cycles.
     const UNDAMPED: usize = 20;
-    /// Passes of the iteration before it counts as failed; some five are usual.
+    /// Passes after which the iteration counts as failed; some five are usual.
     const MOST_PASSES: usize = 200;
-    /// Change of a flow, relative to it, below which the iteration ends. It converges quadratically, so that the law
-    /// then holds to the square of this.
+    /// Relative change of a flow below which the iteration ends. It converges quadratically, so the law then holds to
+    /// the square of this.
     pub const ACCURACY: f64 = 1e-8;
-    /// Flow that counts as none, relative to the largest.
+    /// Flow that counts as zero, relative to the largest.
     const NEGLIGIBLE: f64 = 1e-14;
 
     pub fn all(&self) -> &[NetworkEnd] {
         &self.list
+    }
+
+    pub fn all_mut(&mut self) -> &mut [NetworkEnd] {
+        &mut self.list
     }
 
     pub fn clear(&mut self) {
@@ -155,13 +166,13 @@ impl OpenEnds {
         self.is_untraced = true;
     }
 
-    /// Puts ends in the place of all that a segment had. One that is the same keeps its state.
+    /// Replaces all ends of a segment. An unchanged end keeps its state.
     pub fn replace(&mut self, node: NodeId, ends: [Option<NetworkEnd>; 2]) {
         let indices = self.indices_of(node);
         let kept = |end: NetworkEnd| {
             let before = self.list[indices.clone()].iter().find(|before| before.is_same(&end));
             let mut end = before.copied().unwrap_or(end);
-            // The network below it is another one now.
+            // The network at the end has changed.
             end.stump = Shunt::default();
             end
         };
@@ -170,13 +181,13 @@ impl OpenEnds {
         self.is_untraced = true;
     }
 
-    /// Where the ends of a segment are in the list.
-    fn indices_of(&self, node: NodeId) -> Range<usize> {
+    /// Positions of a segment's ends in the list.
+    pub fn indices_of(&self, node: NodeId) -> Range<usize> {
         self.list.partition_point(|end| end.node < node)..self.list.partition_point(|end| end.node <= node)
     }
 
-    /// Puts ends in the place of all that there are, in the order of the node, proximal before distal. One that is the same
-    /// keeps its state; those of `changed` segments, which are in rising order, draw nothing until they are solved for.
+    /// Replaces all ends, in the order of their nodes, proximal before distal. An unchanged end keeps its state; those
+    /// of `changed` segments, which are in rising order, draw nothing until they are solved.
     pub fn replace_all(&mut self, ends: Vec<NetworkEnd>, changed: &[NodeId]) {
         let mut before = std::mem::replace(&mut self.list, ends).into_iter().peekable();
         let mut changed = changed.iter().peekable();
@@ -199,11 +210,24 @@ impl OpenEnds {
         self.list[index].opening = share;
     }
 
+    /// Traces the skeleton again if needed. The circuit's sums must be up to date.
+    pub fn trace(&mut self, circuit: &Circuit) {
+        if !std::mem::take(&mut self.is_untraced) {
+            return;
+        }
+        let attached = self.list.iter().map(|end| end.attached);
+        at_once(self.skeleton.trace(circuit, attached, &Pace::default()));
+        for end in &mut self.list {
+            end.joint = self.skeleton.joint_at(end.attached);
+        }
+        self.is_unsolved = true;
+    }
+
     /// Finds the flows of all ends at once.
     ///
-    /// Newton's method on Δ = R·Q + K·Q² in the flows, in which the law is convex: from a flow too large it comes down to
-    /// the solution without passing it. Each pass solves the skeleton exactly. `source` and `ambient` are above the bed's
-    /// pressure `bed`.
+    /// Newton's method on Δ = R·Q + K·Q² in the flows, in which the law is convex: from a larger flow it falls to the
+    /// solution without passing it. Each pass solves the skeleton exactly. `source` and `ambient` are relative to the
+    /// bed's pressure `bed`.
     pub fn solve(&mut self, source: f64, ambient: f64, bed: f64) -> Result<(), FlowError> {
         if !std::mem::take(&mut self.is_unsolved) {
             return Ok(());
@@ -228,8 +252,8 @@ impl OpenEnds {
         Err(FlowError::NotConverged { what: "the flow through open ends", passes: Self::MOST_PASSES, residual })
     }
 
-    /// First guess: the last flow, or what an end alone would let out. An end with too little pressure while all are
-    /// closed has no flow, since others can only take pressure from it.
+    /// First guess: the last flow, or that of an end alone. An end with too little pressure while all are closed has no
+    /// flow, since others can only lower its pressure.
     fn start(&mut self, source: f64, ambient: f64) {
         self.skeleton.begin(ambient);
         self.skeleton.solve(source, ambient);
@@ -239,7 +263,7 @@ impl OpenEnds {
         }
     }
 
-    /// One pass. Returns the largest change of a flow, in units of what is tolerated.
+    /// One pass. Returns the largest change of a flow, in units of the tolerance.
     fn pass(&mut self, source: f64, ambient: f64, damped: bool) -> f64 {
         self.linearise();
         self.skeleton.begin(ambient);
@@ -253,7 +277,7 @@ impl OpenEnds {
         residual
     }
 
-    /// What every end draws by the tangent to its law at its flow, by pressures above that outside.
+    /// Sets every end's draw to the tangent of its law at its flow, for pressures relative to that outside.
     pub fn linearise(&mut self) {
         for end in &mut self.list {
             end.stump = Shunt::default();
@@ -268,15 +292,15 @@ impl OpenEnds {
         }
     }
 
-    /// What the ends draw, by pressures that count from one of `pressure`.
+    /// Converts the ends' draw to pressures relative to `pressure`.
     pub fn count_from(&mut self, pressure: f64) {
         for end in &mut self.list {
             end.stump = end.stump.counted_from(pressure);
         }
     }
 
-    /// Takes the flows that follow from the pressures of a linearised solution, which are above that outside and exact to
-    /// `rounding`. Returns the largest change of a flow, in units of what is tolerated.
+    /// Takes the flows from the pressures of a linearised solution, which are relative to that outside and exact to
+    /// `rounding`. Returns the largest change of a flow, in units of the tolerance.
     pub fn accept(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, rounding: f64, damped: bool) -> f64 {
         let largest = self.list.iter().map(|end| end.flow).fold(0.0, f64::max);
         let mut residual = 0.0_f64;
@@ -294,8 +318,8 @@ impl OpenEnds {
         residual
     }
 
-    /// Pressures, and what the ends draw as conductances to the outside, by pressures above the bed's. The pressures of
-    /// the solution are above that outside.
+    /// Sets pressures, and the ends' draw as conductances to the outside, for pressures relative to the bed's. The
+    /// pressures of the solution are relative to that outside.
     pub fn finish(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, ambient: f64, bed: f64) {
         for end in &mut self.list {
             let difference = pressure(end);
@@ -310,84 +334,36 @@ impl OpenEnds {
             end.pressure = ambient + difference - end.piece * end.flow + bed;
         }
     }
-}
 
-impl Network {
-    /// Measures all ends again, after segments changed.
-    pub(super) fn measure_ends(&mut self) {
-        for index in 0..self.ends.list.len() {
-            self.measure_end(index);
-        }
-        self.ends.is_untraced = true;
-    }
-
-    /// Measures the ends of one segment.
-    pub(super) fn measure_ends_of(&mut self, node: NodeId) {
-        for index in self.ends.indices_of(node) {
-            self.measure_end(index);
-        }
-    }
-
-    fn measure_end(&mut self, index: usize) {
-        let NetworkEnd { node, side, along, .. } = self.ends.list[index];
-        let whole = self.whole_resistance(node.index());
-        let slot = node_slot(node.index());
-        let (attached, share) = match side {
-            EndSide::Proximal => (self.links[slot].parent, along),
-            EndSide::Distal => (slot as u32, 1.0 - along),
-        };
-        let discharge = f64::from(self.settings.discharge_coefficient);
-        self.ends.list[index].measure(attached, whole * f64::from(share), self.settings.scale, discharge);
-    }
-
-    /// Traces the skeleton again where that is due.
-    pub(super) fn trace_ends(&mut self) {
-        if !std::mem::take(&mut self.ends.is_untraced) {
+    /// Adds the flows to the sums of the circuit if needed.
+    pub fn add_to_sums(&mut self, circuit: &mut Circuit) {
+        if !std::mem::take(&mut self.is_unloaded) {
             return;
         }
-        let mut skeleton = std::mem::take(&mut self.ends.skeleton);
-        let attached = self.ends.list.iter().map(|end| end.attached);
-        at_once(skeleton.trace(self, attached, &Pace::default()));
-        self.ends.skeleton = skeleton;
-        for end in &mut self.ends.list {
-            end.joint = self.ends.skeleton.joint_at(end.attached);
-        }
-        self.ends.is_unsolved = true;
-    }
-
-    /// Puts the flows of the open ends into the network's sums.
-    pub(super) fn load_ends(&mut self) {
-        if !std::mem::take(&mut self.ends.is_unloaded) {
-            return;
-        }
-        self.load_stumps();
-        for at in 0..self.ends.skeleton.active().len() {
-            self.sum_at(self.ends.skeleton.active()[at]);
+        self.load(circuit);
+        for &slot in self.skeleton.active() {
+            circuit.sum_at(slot);
         }
     }
 
-    /// Puts what the open ends draw into the shunts of their nodes.
-    pub(super) fn load_stumps(&mut self) {
-        for end in &self.ends.list {
-            self.shunts[end.attached as usize] = self.beds[end.attached as usize];
+    /// Adds the draw of the ends to the shunts of their nodes.
+    pub fn load(&self, circuit: &mut Circuit) {
+        for end in &self.list {
+            circuit.shunts[end.attached as usize] = circuit.beds[end.attached as usize];
         }
-        for end in &self.ends.list {
-            let shunt = &mut self.shunts[end.attached as usize];
-            shunt.y += end.stump.y;
-            shunt.s += end.stump.s;
+        for end in &self.list {
+            end.draw_from(circuit);
         }
     }
 
-    /// Puts into the shunts of some slots, which rise, what leaves their nodes and is no child: the bed, and the open ends
-    /// as of the last solution.
-    pub(super) fn load_shunts(&mut self, slots: &[u32]) {
+    /// Sets the shunts of some slots, in rising order: all that leaves their nodes except children, that is, the bed,
+    /// and the ends as of the last solution.
+    pub fn load_at(&self, slots: &[u32], circuit: &mut Circuit) {
         for &slot in slots {
-            self.shunts[slot as usize] = self.beds[slot as usize];
+            circuit.shunts[slot as usize] = circuit.beds[slot as usize];
         }
-        for end in self.ends.list.iter().filter(|end| slots.binary_search(&end.attached).is_ok()) {
-            let shunt = &mut self.shunts[end.attached as usize];
-            shunt.y += end.stump.y;
-            shunt.s += end.stump.s;
+        for end in self.list.iter().filter(|end| slots.binary_search(&end.attached).is_ok()) {
+            end.draw_from(circuit);
         }
     }
 }

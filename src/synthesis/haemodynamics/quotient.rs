@@ -1,19 +1,19 @@
-//! A tree as what joins it to another network sees it: linked nodes, open ends and the forks between them.
+//! A tree reduced to its joints with another network: linked nodes, open ends and the forks between them.
 //!
-//! In: a [`Network`], the slots that links end in, and what open ends draw. Out: pressures at those slots for any currents
-//! into them, at the cost of the joints alone: two for each link or end at most, however large the tree.
+//! In: a [`Network`], the slots with links, and the draw of open ends. Out: pressures at those slots for any currents
+//! into them, at the cost of the joints alone: at most two for each link or end, however large the tree.
 
 use super::{Network, open_ends::OpenEnds, skeleton::Skeleton};
 use crate::synthesis::pace::Pace;
 
-/// A joint with all below it eliminated.
+/// A joint after eliminating all joints below it.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     /// The joint above, the source or nothing.
     above: u32,
-    /// Share of a current into the joint that goes on upwards, and of the pressure above that arrives.
+    /// Share of a current into the joint that goes upwards, and of the pressure above that arrives.
     share: f64,
-    /// Pressure for each current, while none is above.
+    /// Pressure per current, for zero pressure above.
     resistance: f64,
 }
 
@@ -24,24 +24,24 @@ pub(super) struct Quotient {
     nodes: Vec<Node>,
     /// Conductances below the joints, while they are eliminated.
     sums: Vec<f64>,
-    /// Currents into the joints, and in turn their pressures. Then those of the source, and of nothing.
+    /// Currents into the joints, which become their pressures. Then those of the source and of the null joint.
     values: Vec<f64>,
 }
 
 impl Quotient {
-    /// Traces the tree again, after it changed or was cut, or other nodes were linked.
+    /// Traces the tree again, after it changed or was cut, or the linked nodes changed.
     pub async fn trace(&mut self, network: &mut Network, linked: &[u32], pace: &Pace) {
-        network.sum_all(&pace.part(0.0..0.5)).await;
+        network.circuit.sum_all(&pace.part(0.0..0.5)).await;
         let ends = network.ends.all().iter().map(|end| end.attached);
-        self.skeleton.trace(network, linked.iter().copied().chain(ends), &pace.part(0.5..1.0)).await;
+        self.skeleton.trace(&network.circuit, linked.iter().copied().chain(ends), &pace.part(0.5..1.0)).await;
     }
 
-    /// The joint of a slot that is linked, or that an end is attached to.
+    /// The joint of a slot with a link or an attached end.
     pub fn joint_at(&self, slot: u32) -> u32 {
         self.skeleton.joint_at(slot)
     }
 
-    /// Eliminates the joints from the tips to the roots, with what open ends draw.
+    /// Eliminates the joints from the tips to the roots, with the draw of open ends.
     pub fn eliminate(&mut self, ends: &OpenEnds) {
         let joints = self.skeleton.joints();
         let (source, nothing) = (joints.len() as u32, joints.len() as u32 + 1);
@@ -62,7 +62,7 @@ impl Quotient {
                 self.sums[above as usize] += joint.run.upper.y + share * y;
                 Node { above, share, resistance: 1.0 / total }
             } else {
-                // Cut off. A piece without a bed has run dry.
+                // Cut off: a piece without a bed has run dry.
                 Node { above: nothing, share: 0.0, resistance: if below > 0.0 { 1.0 / below } else { 0.0 } }
             });
         }
@@ -74,12 +74,12 @@ impl Quotient {
         self.values.resize(self.nodes.len() + 2, 0.0);
     }
 
-    /// Gives a current into a joint.
+    /// Adds a current into a joint.
     pub fn give(&mut self, joint: u32, current: f64) {
         self.values[joint as usize] += current;
     }
 
-    /// Finds the pressures of all joints, with roots held at one above the bed's.
+    /// Finds the pressures of all joints, with roots held at `source` above the bed's.
     pub fn solve(&mut self, source: f64) {
         for (at, node) in self.nodes.iter().enumerate() {
             let given = node.share * self.values[at];
@@ -93,7 +93,7 @@ impl Quotient {
         }
     }
 
-    /// Pressure of a joint above the bed's.
+    /// Pressure of a joint relative to the bed's.
     pub fn pressure(&self, joint: u32) -> f64 {
         self.values[joint as usize]
     }

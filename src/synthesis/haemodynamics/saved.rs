@@ -1,14 +1,15 @@
-//! Bleeding and blood as they are written to files.
+//! File forms of bleeding and blood. Reading checks every number against its limits.
 
 use crate::synthesis::{
     haemodynamics::{Bleeding, BleedingEnd, BleedingSettings, BloodVolume, BloodVolumeSettings, FlowError},
     units::Volume,
 };
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
 /// [`Bleeding`] in a file.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(rename = "Bleeding", deny_unknown_fields)]
-pub(super) struct SavedBleeding {
+struct SavedBleeding {
     settings: BleedingSettings,
     ends: Vec<BleedingEnd>,
     time: f64,
@@ -41,11 +42,22 @@ impl TryFrom<SavedBleeding> for Bleeding {
     }
 }
 
+impl Serialize for Bleeding {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SavedBleeding::from(self.clone()).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Bleeding {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        SavedBleeding::deserialize(deserializer)?.try_into().map_err(D::Error::custom)
+    }
+}
+
 /// [`BloodVolume`] in a file.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[serde(rename = "BloodVolume", default, deny_unknown_fields)]
-#[derive(Default)]
-pub(super) struct SavedBlood {
+struct SavedBlood {
     settings: BloodVolumeSettings,
     lost: Volume,
 }
@@ -64,6 +76,18 @@ impl TryFrom<SavedBlood> for BloodVolume {
         FlowError::check_finite("the lost blood in mL", saved.lost.ml())?;
         blood.lose(saved.lost);
         Ok(blood)
+    }
+}
+
+impl Serialize for BloodVolume {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SavedBlood::from(*self).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for BloodVolume {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        SavedBlood::deserialize(deserializer)?.try_into().map_err(D::Error::custom)
     }
 }
 

@@ -1,7 +1,8 @@
-//! What a network of vessels hangs between: pressure at its roots, bed at its terminals, air at its wounds.
+//! Boundary conditions of a network of vessels: pressure at its roots, bed at its terminals, outside pressure at its
+//! wounds.
 //!
-//! Arteries are driven by a root pressure above that of the bed. Veins are the same network the other way round: their
-//! root pressure lies below that of the bed, and every flow is negative, from the terminals to the root.
+//! Arteries are driven by a root pressure above that of the bed. Veins are the same in reverse: their root pressure
+//! lies below that of the bed, and every flow is negative, from the terminals to the root.
 
 use super::{FlowError, ViscosityLaw};
 use crate::synthesis::units::{Pressure, Resistance, Scale};
@@ -13,11 +14,11 @@ use bevy_math::ops;
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct FlowSettings {
-    /// Size of a tissue length. Resistance falls with its cube, so that a wrong scale shows at once.
+    /// Size of a tissue length. Resistance falls with its cube, so a wrong scale is easily seen.
     ///
     /// Default: [`Scale::MILLIMETRES`].
     pub scale: Scale,
-    /// How viscosity depends on the diameter.
+    /// How viscosity depends on vessel diameter.
     ///
     /// Default: [`ViscosityLaw::IN_VIVO`].
     pub viscosity: ViscosityLaw,
@@ -25,12 +26,12 @@ pub struct FlowSettings {
     ///
     /// Default: constant, [`Self::DEFAULT_ARTERIAL_PRESSURE`].
     pub root: RootPressure,
-    /// What terminals drain into.
+    /// The bed into which terminals drain.
     pub bed: BedSettings,
-    /// Pressure outside the vessels, which an open end bleeds against: that of the air, of the gas in a closed abdomen,
+    /// Pressure outside the vessels, against which an open end bleeds: that of the air, of the gas in a closed abdomen,
     /// or of a compress.
     ///
-    /// Higher values make wounds bleed less. Limits: finite. Default: that of the air, 0.
+    /// Higher values make wounds bleed less. Limits: finite. Default: atmospheric, 0.
     pub ambient: Pressure,
     /// Discharge coefficient of an open end: the share of an ideal orifice's flow that passes.
     ///
@@ -108,7 +109,7 @@ impl Default for FlowSettings {
 pub struct BedSettings {
     /// Pressure of the bed's common pool.
     ///
-    /// Higher values slow arteries, drive veins and make the far end of a cut vessel bleed back.
+    /// Higher values reduce arterial flow, raise venous flow and make the far end of a cut vessel bleed back.
     ///
     /// Limits: finite. Default: [`Self::DEFAULT_PRESSURE`].
     pub pressure: Pressure,
@@ -145,14 +146,14 @@ impl Default for BedSettings {
 pub enum RootPressure {
     /// The same at all times.
     Constant(Pressure),
-    /// A beating heart's.
+    /// Pulsatile, as of a beating heart.
     Pulsatile(Pulse),
 }
 
 impl RootPressure {
     /// The pressure at a time.
     ///
-    /// `seconds` counts from the lowest pressure of a beat.
+    /// `seconds` is the time since the lowest pressure of a beat.
     pub fn at(&self, seconds: f64) -> Pressure {
         match self {
             Self::Constant(pressure) => *pressure,
@@ -160,7 +161,7 @@ impl RootPressure {
         }
     }
 
-    /// The pressure's mean over time.
+    /// The mean pressure over time.
     pub fn mean(&self) -> Pressure {
         match self {
             Self::Constant(pressure) => *pressure,
@@ -176,17 +177,17 @@ impl RootPressure {
     }
 }
 
-/// The pressure of an artery that a heart beats in.
+/// A pulsatile arterial pressure.
 ///
-/// Over a beat the pressure is the diastolic one and (u² + 2u³)/3 of what the systolic one has more, with
-/// u = (1 − cos 2πφ)/2: smooth, lowest at the phase φ = 0, highest at ½, and narrower at the top than at the bottom. Its
-/// mean is exactly that of the clinic's rule, the diastolic pressure and a third of the difference.
+/// Over a beat the pressure is the diastolic one plus (u² + 2u³)/3 of the difference to the systolic one, with u = (1 −
+/// cos 2πφ)/2: smooth, lowest at the phase φ = 0, highest at ½, and narrower at the top than at the bottom. Its mean is
+/// exactly that of the clinical rule: the diastolic pressure plus a third of the difference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Pulse {
-    /// Beats of the heart.
+    /// Heart rate.
     ///
     /// Units: per minute. Limits: finite, > 0. Default: [`Self::DEFAULT_HEART_RATE`].
     pub heart_rate: f32,
@@ -213,7 +214,7 @@ impl Pulse {
         60.0 / f64::from(self.heart_rate)
     }
 
-    /// The pressure at a time in seconds, which counts from the lowest pressure of a beat.
+    /// The pressure at a time in seconds since the lowest pressure of a beat.
     pub fn at(&self, seconds: f64) -> Pressure {
         let beats = seconds / self.period();
         let phase = (beats - beats.floor()) as f32;
@@ -221,7 +222,7 @@ impl Pulse {
         self.between(u * u * (1.0 + 2.0 * u) / 3.0)
     }
 
-    /// Mean over a beat: the diastolic pressure and a third of the difference to the systolic one.
+    /// Mean over a beat: the diastolic pressure plus a third of the difference to the systolic one.
     pub fn mean(&self) -> Pressure {
         self.between(1.0 / 3.0)
     }

@@ -1,18 +1,18 @@
-//! One of the two networks of a circulation, as the links between them see it.
+//! One of the two networks of a circulation, reduced to its linked nodes.
 
 use super::{
     Network,
-    network::{SOURCE, node_slot},
+    circuit::{SOURCE, node_slot},
     quotient::Quotient,
 };
 use crate::synthesis::{pace::Pace, tree::NodeId};
 
-/// The nodes of one network that links end in, and its answer to currents into them.
+/// The linked nodes of one network, and its response to currents into them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Side {
     /// Slots of the nodes, in rising order.
     pub slots: Vec<u32>,
-    /// For every link, the place of its node in `slots`.
+    /// For every link, the index of its node in `slots`.
     pub of_links: Vec<u32>,
     pub quotient: Quotient,
     /// The joint of each slot.
@@ -33,7 +33,7 @@ impl Side {
         Self { slots, of_links, ..Self::default() }
     }
 
-    /// Traces the network where it has changed, and takes the pressures of its last solution.
+    /// Traces the network if it has changed, and takes the pressures of its last solution.
     pub async fn prepare(&mut self, network: &mut Network, pace: &Pace) {
         if self.traced != Some(network.revision) {
             self.quotient.trace(network, &self.slots, pace).await;
@@ -41,10 +41,10 @@ impl Side {
             self.traced = Some(network.revision);
         }
         self.pressures.clear();
-        self.pressures.extend(self.slots.iter().map(|&slot| network.slots[slot as usize].pressure));
+        self.pressures.extend(self.slots.iter().map(|&slot| network.circuit.slots[slot as usize].pressure));
     }
 
-    /// Pressures at the linked nodes that currents into them cause, all else being at pressure 0: T⁻¹.
+    /// Pressures at the linked nodes caused by currents into them, with everything else at pressure 0: T⁻¹.
     pub fn respond(&mut self, currents: &[f64], pressures: &mut [f64]) {
         self.quotient.begin();
         self.give(currents);
@@ -54,8 +54,8 @@ impl Side {
         }
     }
 
-    /// Pressures at the linked nodes with all that drives the network: its roots, its open ends as they are linearised,
-    /// and what the links bring.
+    /// Pressures at the linked nodes with everything that drives the network: its roots, its linearised open ends, and
+    /// the currents of the links.
     pub fn settle(&mut self, network: &Network, currents: &[f64]) {
         self.quotient.begin();
         self.give(currents);
@@ -74,7 +74,7 @@ impl Side {
         }
     }
 
-    /// What the links bring to this side from pressures on the other: E.
+    /// Currents of the links into this side from pressures on the other: E.
     pub fn carry(&self, other: &Self, conductance: f64, pressures: &[f64], currents: &mut [f64]) {
         currents.fill(0.0);
         for (&here, &there) in self.of_links.iter().zip(&other.of_links) {
@@ -82,32 +82,32 @@ impl Side {
         }
     }
 
-    /// Forgets what links bring to roots, whose pressure is given: there is nothing to balance.
+    /// Zeroes the currents of links into roots, whose pressure is given: there is nothing to balance.
     pub fn excuse_roots(&self, network: &Network, currents: &mut [f64]) {
         for (current, &slot) in currents.iter_mut().zip(&self.slots) {
-            if network.links[slot as usize].upstream == SOURCE {
+            if network.circuit.links[slot as usize].upstream == SOURCE {
                 *current = 0.0;
             }
         }
     }
 
-    /// Sets what the links bring, and solves the network with its ends as they are loaded.
+    /// Sets the currents of the links, and solves the network with its loaded ends.
     pub async fn drive(&self, network: &mut Network, currents: &[f64], pace: &Pace) {
         for (&slot, &current) in self.slots.iter().zip(currents) {
-            network.beds[slot as usize].s = current;
-            network.shunts[slot as usize] = network.beds[slot as usize];
+            network.circuit.beds[slot as usize].s = current;
+            network.circuit.shunts[slot as usize] = network.circuit.beds[slot as usize];
         }
-        network.load_stumps();
-        network.sum_all(&pace.part(0.0..0.5)).await;
+        network.ends.load(&mut network.circuit);
+        network.circuit.sum_all(&pace.part(0.0..0.5)).await;
         network.spread_pressures(&pace.part(0.5..1.0)).await;
-        // What changes from here on makes a later solution of this network alone begin anew.
+        // A later solution of this network alone must start over.
         network.sums_stale = true;
         network.ends.is_untraced = true;
     }
 }
 
 impl Network {
-    /// Joins nodes to another network, in place of those that were: each as often as it is named. All are there.
+    /// Replaces the nodes that are joined to another network: each is joined as often as it is named. All must exist.
     pub(super) async fn set_links(&mut self, nodes: impl Iterator<Item = NodeId>, pace: &Pace) {
         self.link_counts.clear();
         self.link_counts.resize(self.len(), 0);
@@ -117,7 +117,7 @@ impl Network {
         self.set_beds(pace).await;
     }
 
-    /// Sets what all nodes drain into.
+    /// Sets the beds of all nodes.
     pub(super) async fn set_beds(&mut self, pace: &Pace) {
         pace.each(self.len(), |node| self.set_bed(node)).await;
         self.sums_stale = true;
@@ -125,12 +125,7 @@ impl Network {
         self.ends.is_untraced = true;
     }
 
-    /// Pressure outside above the bed's.
-    pub(super) fn ambient(&self) -> f64 {
-        self.settings.ambient.pascals() - self.bed
-    }
-
-    /// What the ends draw by their tangents, by pressures above the bed's.
+    /// Sets the ends' draw by their tangents, for pressures relative to the bed's.
     pub(super) fn linearise_ends(&mut self) {
         self.ends.linearise();
         self.ends.count_from(-self.ambient());

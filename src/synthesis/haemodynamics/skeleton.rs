@@ -1,14 +1,11 @@
 //! The part of a network that open ends act on, small enough to be solved many times in a frame.
 //!
-//! Only the paths from the open ends to their roots matter. All that hangs off them is a constant shunt, and a run of
-//! segments between two joints, where an end is attached or two paths meet, is one conductance with a shunt at each of
-//! its ends: eliminating the nodes between, one by one, turns a star of three into a triangle. All of it adds, multiplies
-//! and divides positive numbers. So m ends make at most 2m joints, however large the tree.
+//! Only the paths from the open ends to their roots matter. Everything that hangs off them is a constant shunt. Joints
+//! are nodes where an end is attached or two paths meet. A run of segments between two joints is one conductance with a
+//! shunt at each end: eliminating the nodes in between, one by one, turns a star of three into a triangle. All
+//! operations add, multiply and divide positive numbers. So m ends make at most 2m joints, however large the tree.
 
-use super::{
-    Network,
-    network::{REFERENCE, SOURCE, Shunt},
-};
+use super::circuit::{Circuit, REFERENCE, SOURCE, Shunt};
 use crate::synthesis::pace::{Pace, Stretch};
 
 /// No joint.
@@ -21,7 +18,7 @@ pub(super) struct Joint {
     above: u32,
     /// Whether it is a root, held at the root pressure.
     pub is_root: bool,
-    /// Bed, links and whole subtrees that hang off it.
+    /// Bed, links and whole subtrees at the joint.
     pub hanging: Shunt,
     /// The run of segments to the joint above.
     pub run: Run,
@@ -46,10 +43,10 @@ impl Joint {
 }
 
 impl Run {
-    /// A run longer by the node at its upper end, which has a shunt, and by the segment above that.
+    /// Extends the run by the node at its upper end, which has a shunt, and by the segment above that.
     fn extend(&mut self, hanging: Shunt, resistance: f64) {
         let middle = Shunt { y: self.upper.y + hanging.y, s: self.upper.s + hanging.s };
-        // Shares of the three arms of the star, with all conductances times the new segment's resistance.
+        // Shares of the three arms of the star, with all conductances multiplied by the new segment's resistance.
         let total = 1.0 + resistance * (self.through + middle.y);
         let (up, down) = (1.0 / total, resistance * self.through / total);
         self.upper = Shunt { y: middle.y * up, s: middle.s * up };
@@ -66,29 +63,29 @@ pub(super) struct Skeleton {
     joints: Vec<Joint>,
     /// All slots on the paths, below before above.
     active: Vec<u32>,
-    /// The joint of a slot. Right for slots on the paths alone.
+    /// The joint of a slot. Only valid for slots on the paths.
     joint_of: Vec<u32>,
-    /// The trace in which a slot was last on a path.
+    /// Number of the trace in which a slot was last on a path.
     seen: Vec<u32>,
     trace: u32,
 }
 
 impl Skeleton {
-    /// What [`joint_of`](Self::joint_of) holds for a slot that is going to be a joint.
+    /// Value of [`joint_of`](Self::joint_of) for a slot that will be a joint.
     const DUE: u32 = u32::MAX - 1;
 
-    /// Traces the paths from the slots that ends are attached to. The sums of all slots off the paths must be right.
-    pub async fn trace(&mut self, network: &Network, attached: impl Iterator<Item = u32>, pace: &Pace) {
-        self.begin_trace(network.links.len());
+    /// Traces the paths from the slots with attached ends. The sums of all slots off the paths must be up to date.
+    pub async fn trace(&mut self, circuit: &Circuit, attached: impl Iterator<Item = u32>, pace: &Pace) {
+        self.begin_trace(circuit.links.len());
         let (mut walks, mut stretch) = (Vec::new(), Stretch::default());
         for slot in attached {
             walks.push(self.active.len());
-            self.walk(network, slot);
+            self.walk(circuit, slot);
             if stretch.ends_after(self.active.len() - walks[walks.len() - 1]) {
                 pace.rest(0.0).await;
             }
         }
-        // A later walk ends where it meets an earlier one, so that its slots lie below.
+        // A later walk ends where it meets an earlier one, so its slots lie below.
         let mut ordered = Vec::with_capacity(self.active.len());
         let mut end = self.active.len();
         for &start in walks.iter().rev() {
@@ -100,7 +97,7 @@ impl Skeleton {
             let slot = self.active[at];
             if self.joint_of[slot as usize] == Self::DUE {
                 self.joint_of[slot as usize] = self.joints.len() as u32;
-                let joint = self.joint(network, slot);
+                let joint = self.joint(circuit, slot);
                 self.joints.push(joint);
             }
             if stretch.ends_after(1) {
@@ -124,13 +121,13 @@ impl Skeleton {
         }
     }
 
-    /// Marks the path from a slot up to its root, or to where it meets one that is marked.
-    fn walk(&mut self, network: &Network, start: u32) {
+    /// Marks the path from a slot up to its root, or to a marked path.
+    fn walk(&mut self, circuit: &Circuit, start: u32) {
         let mut slot = start;
         while self.seen[slot as usize] != self.trace {
             self.seen[slot as usize] = self.trace;
             self.active.push(slot);
-            let upstream = network.links[slot as usize].upstream;
+            let upstream = circuit.links[slot as usize].upstream;
             let begins = upstream <= SOURCE;
             self.joint_of[slot as usize] = if slot == start || begins { Self::DUE } else { NONE };
             if begins {
@@ -141,13 +138,13 @@ impl Skeleton {
         self.joint_of[slot as usize] = Self::DUE;
     }
 
-    /// Measures what hangs off a joint, and the run above it. Its `above` is a slot for now.
-    fn joint(&self, network: &Network, slot: u32) -> Joint {
-        let mut upper = network.links[slot as usize].upstream;
+    /// Measures the shunt at a joint, and the run above it. Its `above` is still a slot.
+    fn joint(&self, circuit: &Circuit, slot: u32) -> Joint {
+        let mut upper = circuit.links[slot as usize].upstream;
         let mut joint = Joint {
             above: NONE,
             is_root: upper == SOURCE,
-            hanging: self.hanging(network, slot),
+            hanging: self.hanging(circuit, slot),
             run: Run::default(),
             below: Shunt::default(),
             pressure: 0.0,
@@ -155,25 +152,25 @@ impl Skeleton {
         if upper <= SOURCE {
             return joint;
         }
-        joint.run.through = 1.0 / network.slots[slot as usize].resistance;
+        joint.run.through = 1.0 / circuit.slots[slot as usize].resistance;
         while self.joint_of[upper as usize] == NONE {
-            joint.run.extend(self.hanging(network, upper), network.slots[upper as usize].resistance);
-            upper = network.links[upper as usize].upstream;
+            joint.run.extend(self.hanging(circuit, upper), circuit.slots[upper as usize].resistance);
+            upper = circuit.links[upper as usize].upstream;
         }
         joint.above = upper;
-        // A run that leaks all it carries still joins its ends, so that no division is by 0.
+        // A run whose flow all leaks still joins its ends, so that nothing is divided by 0.
         joint.run.through = joint.run.through.max(f64::MIN_POSITIVE);
         joint
     }
 
-    /// Bed, links and the children that are on no path.
-    fn hanging(&self, network: &Network, slot: u32) -> Shunt {
-        let mut hanging = network.beds[slot as usize];
-        let mut child = network.links[slot as usize].first_child;
+    /// Bed, links and the children off the paths.
+    fn hanging(&self, circuit: &Circuit, slot: u32) -> Shunt {
+        let mut hanging = circuit.beds[slot as usize];
+        let mut child = circuit.links[slot as usize].first_child;
         while child != REFERENCE {
-            let link = network.links[child as usize];
+            let link = circuit.links[child as usize];
             if link.upstream == slot && self.seen[child as usize] != self.trace {
-                let below = &network.slots[child as usize];
+                let below = &circuit.slots[child as usize];
                 hanging.y += below.below.y * below.through;
                 hanging.s += below.below.s * below.through;
             }
@@ -192,27 +189,27 @@ impl Skeleton {
         &self.active
     }
 
-    /// The joint of a slot that an end is attached to.
+    /// The joint of a slot with an attached end.
     pub fn joint_at(&self, slot: u32) -> u32 {
         self.joint_of[slot as usize]
     }
 
-    /// Begins a solution without open ends. From here to its end pressures count from that outside, which is `ambient`
-    /// above the bed's: a wide hole leaves so little pressure before it that it would be lost beside the bed's.
+    /// Begins a solution without open ends. Until its end, pressures are relative to that outside, which is `ambient`
+    /// above the bed's: a wide hole leaves so little pressure before it that rounding would lose it beside the bed's.
     pub fn begin(&mut self, ambient: f64) {
         for joint in &mut self.joints {
             joint.below = joint.hanging.counted_from(ambient);
         }
     }
 
-    /// Adds what an open end draws.
+    /// Adds the draw of an open end.
     pub fn draw(&mut self, joint: u32, stump: Shunt) {
         let below = &mut self.joints[joint as usize].below;
         below.y += stump.y;
         below.s += stump.s;
     }
 
-    /// Finds the pressures of all joints. The root pressure is above the bed's.
+    /// Finds the pressures of all joints. The root pressure is relative to the bed's.
     pub fn solve(&mut self, source: f64, ambient: f64) {
         for at in 0..self.joints.len() {
             let Joint { above, run, below, .. } = self.joints[at];
@@ -231,7 +228,7 @@ impl Skeleton {
             self.joints[at].pressure = if is_root {
                 source - ambient
             } else if above == NONE {
-                // Cut off: what its bed and ends give. One without a bed has run dry.
+                // Cut off: its bed and ends determine the pressure. A piece without a bed has run dry.
                 if below.y > 0.0 { below.s / below.y } else { 0.0 }
             } else {
                 let lower = run.lower.counted_from(ambient);
@@ -241,7 +238,7 @@ impl Skeleton {
         }
     }
 
-    /// Pressure of a joint above that outside.
+    /// Pressure of a joint relative to that outside.
     pub fn pressure(&self, joint: u32) -> f64 {
         self.joints[joint as usize].pressure
     }

@@ -1,42 +1,42 @@
-//! What a solved network tells: pressures and flows by node, and what follows from them.
+//! The solution of a network: pressures and flows by node, and values derived from them.
 
 use super::{
     Network, NetworkEnd,
-    network::{FIRST, REFERENCE, SOURCE},
+    circuit::{FIRST, REFERENCE, SOURCE},
 };
 use crate::synthesis::units::Flow;
 
 impl Network {
     /// Pressure of every node in pascals, as of the last [`solve`](Self::solve).
     ///
-    /// A node that nothing connects to a root or the bed has the bed's pressure.
+    /// A node without a connection to a root or the bed has the bed's pressure.
     pub fn pressures(&self) -> &[f64] {
         &self.pressures
     }
 
-    /// Flow into every segment at its upper end in m³/s, as of the last [`solve`](Self::solve), by the node that the
-    /// segment ends in. Positive flow goes from the root to the terminals.
+    /// Flow into every segment at its upper end in m³/s, as of the last [`solve`](Self::solve), by its end node.
+    /// Positive flow goes from the root to the terminals.
     ///
-    /// At a root it is the flow into its tree. At an interrupted segment it is what leaves through the cut's proximal
-    /// end; what its distal end loses is in [`open_ends`](Self::open_ends).
+    /// At a root it is the flow into its tree. At an interrupted segment it is the flow out of the cut's proximal end;
+    /// that of the distal end is in [`open_ends`](Self::open_ends).
     pub fn flows(&self) -> &[f64] {
         &self.flows
     }
 
-    /// Flow from a node into the bed in m³/s, as of the last solution; negative where the bed feeds the vessel, and 0
-    /// where the node is no terminal.
+    /// Flow from a node into the bed in m³/s, as of the last solution; negative if the bed feeds the vessel, and 0 if
+    /// the node is no terminal.
     ///
     /// # Panics
-    /// When the node is not of this network.
+    /// If the node is not in this network.
     pub fn bed_flow(&self, node: usize) -> f64 {
-        let bed = self.beds[node + FIRST];
-        bed.y * self.slots[node + FIRST].pressure - bed.s
+        let bed = self.circuit.beds[node + FIRST];
+        bed.y * self.circuit.slots[node + FIRST].pressure - bed.s
     }
 
     /// Resistance of a node's segment while it is whole, in Pa·s/m³; 0 for a root.
     ///
     /// # Panics
-    /// When the node is not of this network.
+    /// If the node is not in this network.
     pub fn resistance(&self, node: usize) -> f64 {
         self.whole_resistance(node)
     }
@@ -59,7 +59,7 @@ impl Network {
     /// Mean velocity in a segment in m/s, as of the last solution, with the sign of its flow.
     ///
     /// # Panics
-    /// When the node is not of this network.
+    /// If the node is not in this network.
     pub fn velocity(&self, node: usize) -> f64 {
         let radius = self.settings.scale.to_metres(self.radii[node]);
         self.flows[node] / (std::f64::consts::PI * radius * radius)
@@ -68,7 +68,7 @@ impl Network {
     /// Shear stress at a segment's wall in Pa, as of the last solution: 4µ|Q|/(πr³).
     ///
     /// # Panics
-    /// When the node is not of this network.
+    /// If the node is not in this network.
     pub fn wall_shear_stress(&self, node: usize) -> f64 {
         let radius = self.settings.scale.to_metres(self.radii[node]);
         // 8µ/(πr⁴)·r/2 is 4µ/(πr³).
@@ -78,11 +78,11 @@ impl Network {
     /// Flow through all roots together, as of the last [`settle`](Self::settle) or [`solve`](Self::solve).
     pub fn inflow(&self) -> Flow {
         let mut sum = 0.0;
-        let mut root = self.links[SOURCE as usize].first_child;
+        let mut root = self.circuit.links[SOURCE as usize].first_child;
         while root != REFERENCE {
-            let below = self.slots[root as usize].below;
+            let below = self.circuit.slots[root as usize].below;
             sum += below.y * self.source - below.s;
-            root = self.links[root as usize].next_sibling;
+            root = self.circuit.links[root as usize].next_sibling;
         }
         Flow::from_cubic_metres_per_second(sum)
     }

@@ -1,4 +1,4 @@
-//! How thick blood flows: the same everywhere, or thinner in small vessels by the Fåhræus–Lindqvist effect.
+//! Viscosity of blood: the same everywhere, or lower in small vessels by the Fåhræus–Lindqvist effect.
 //!
 //! In: the diameter of a vessel in metres. Out: the apparent viscosity for Poiseuille's law. Source: Pries, Secomb,
 //! Gessner, Sperandio, Gross and Gaehtgens, "Resistance to blood flow in microvessels in vivo", Circulation Research 75
@@ -26,9 +26,9 @@ pub enum ViscosityLaw {
         ///
         /// Limits: finite, > 0. Default: [`PLASMA_VISCOSITY`].
         plasma: Viscosity,
-        /// Share of red cells in the volume that is discharged.
+        /// Share of red cells in the discharged volume.
         ///
-        /// Higher values make blood thicker, most of all in small vessels.
+        /// Higher values make blood more viscous, most of all in small vessels.
         ///
         /// Limits: 0 to 0.95. Default: [`Self::DEFAULT_HAEMATOCRIT`].
         haematocrit: f32,
@@ -38,7 +38,7 @@ pub enum ViscosityLaw {
 impl ViscosityLaw {
     /// Default of the haematocrit: that of the published relation.
     pub const DEFAULT_HAEMATOCRIT: f32 = 0.45;
-    /// Diameter below which the relation is not followed further, in micrometres: it diverges at 1.1.
+    /// Diameter below which the relation is held constant, in micrometres: it diverges at 1.1.
     pub const LEAST_DIAMETER: f64 = 3.0;
     const MOST_HAEMATOCRIT: f32 = 0.95;
 
@@ -86,7 +86,7 @@ impl Default for ViscosityLaw {
 ///
 /// `diameter` is in micrometres; below [`ViscosityLaw::LEAST_DIAMETER`] it counts as that.
 pub fn relative_viscosity(diameter: f64, haematocrit: f64) -> f64 {
-    // A metre is as wide as any: the relation has long become constant.
+    // A metre is a safe upper limit: the relation is constant far below it.
     let d = diameter.clamp(ViscosityLaw::LEAST_DIAMETER, 1e6);
     let at_45 = 6.0 * exp(-0.085 * d) + 3.2 - 2.44 * exp(-0.06 * exp(0.645 * ln(d)));
     let d3 = d * d * d;
@@ -96,10 +96,10 @@ pub fn relative_viscosity(diameter: f64, haematocrit: f64) -> f64 {
     (1.0 + (at_45 - 1.0) * share_of_cells(shape, haematocrit) * wall) * wall
 }
 
-/// ((1 − H)^C − 1) / (0.55^C − 1): how much of the effect at H = 0.45 there is at another haematocrit.
+/// ((1 − H)^C − 1) / (0.55^C − 1): share of the effect at H = 0.45 that remains at another haematocrit.
 fn share_of_cells(shape: f64, haematocrit: f64) -> f64 {
     let (here, at_45) = (ln(1.0 - haematocrit), ln(0.55));
-    // The exponent passes through 0 near 11 µm, where both differences vanish and their ratio does not.
+    // The exponent passes through 0 near 11 µm, where both differences vanish but their ratio does not.
     if shape.abs() < 1e-12 { here / at_45 } else { exp_m1(shape * here) / exp_m1(shape * at_45) }
 }
 

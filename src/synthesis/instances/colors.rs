@@ -1,5 +1,5 @@
-//! What colour a segment gets: its system's, one on a ramp by radius, age or Strahler order, or its system's as far as
-//! blood still comes.
+//! Colours of segments: that of their kind, a ramp by radius, age or Strahler order, or that of their kind faded by
+//! supply.
 
 use crate::synthesis::tree::VesselTree;
 use bevy_math::ops;
@@ -7,13 +7,14 @@ use std::{ops::Range, sync::LazyLock};
 
 /// Colours of segments.
 ///
-/// The three ramps spread over a scale that widens in steps as the tree grows. [`refresh`](Self::refresh) after every
-/// change of the tree keeps the scale wide enough and says which colours changed beside those of the changed nodes.
+/// The three ramps cover a scale that widens in steps as the tree grows. Call [`refresh`](Self::refresh) after every
+/// change of the tree: it keeps the scale wide enough and returns which colours changed besides those of the changed
+/// nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SegmentColors {
     /// One colour for all, linear sRGB.
     Uniform([f32; 3]),
-    /// By radius, logarithmically: a vessel twice as wide is the same distance further on the ramp, at any size.
+    /// By radius, logarithmically: doubling the radius is the same distance on the ramp at any size.
     Radius {
         /// Radius of the first colour, tissue lengths. 0: not known yet.
         thinnest: f32,
@@ -40,29 +41,29 @@ pub enum SegmentColors {
 }
 
 impl SegmentColors {
-    /// Number of orders that are told apart; higher ones share the last colour. Grown trees have 6 to 9.
+    /// Number of orders with different colours; higher ones share the last. Grown trees have 6 to 9.
     pub const STRAHLER_LEVELS: u32 = 9;
 
-    /// Steps of supply that are told apart. More would show no better, and have segments written anew with every beat of
-    /// the heart.
+    /// Number of supply levels with different colours. More would look no better, and rewrite segments with every
+    /// heartbeat.
     pub const SUPPLY_LEVELS: u32 = 32;
 
-    /// Colour of a vessel without blood, linear sRGB: wall alone.
+    /// Colour of a vessel without blood, linear sRGB: that of the wall alone.
     pub const BLOODLESS: [f32; 3] = [0.52, 0.46, 0.42];
 
-    /// Colours by radius, of a tree not yet seen.
+    /// Colours by radius, before the first refresh.
     pub const RADIUS: Self = Self::Radius { thinnest: 0.0, widest: 0.0 };
 
-    /// Colours by age, of a tree not yet seen.
+    /// Colours by age, before the first refresh.
     pub const AGE: Self = Self::Age { span: 0 };
 
-    /// Colours by Strahler order, of a tree not yet seen.
+    /// Colours by Strahler order, before the first refresh.
     pub const STRAHLER: Self = Self::Strahler { orders: Vec::new() };
 
-    /// Takes in the tree after the nodes in `changed` were added or changed.
+    /// Updates the colours after the nodes in `changed` were added or changed.
     ///
-    /// Returns further ranges of nodes whose colour is another now. Radius and age scales widen by at least a quarter
-    /// (an octave, for radii) at a time, so all colours change only a few times in a growth.
+    /// Returns further ranges of nodes whose colour changed. Radius and age scales widen by at least a quarter (an
+    /// octave, for radii) at a time, so all colours change only a few times in a growth.
     pub fn refresh(
         &mut self,
         tree: &VesselTree,
@@ -95,10 +96,10 @@ impl SegmentColors {
         }
     }
 
-    /// Takes in the supply of every node, from 0 to 1, where colours follow that. Nodes beyond the end of `supply` count as
+    /// Sets the supply of every node, from 0 to 1, if colours follow supply. Nodes beyond the end of `supply` count as
     /// supplied.
     ///
-    /// Returns ranges of nodes whose colour is another now. A supply that wavers at the limit between two steps changes
+    /// Returns ranges of nodes whose colour changed. A supply that fluctuates at the limit between two levels changes
     /// nothing.
     pub fn set_supply(&mut self, supply: &[f32]) -> Vec<Range<usize>> {
         let Self::Supply { levels, .. } = self else { return Vec::new() };
@@ -106,7 +107,7 @@ impl SegmentColors {
         let known = levels.iter().copied().chain(std::iter::repeat(all));
         let level = |(&supply, known): (&f32, u32)| {
             let exact = supply.clamp(0.0, 1.0) * all as f32;
-            // `as` takes NaN to 0
+            // `as` turns NaN into 0
             if (exact - known as f32).abs() <= Self::SUPPLY_REST { known } else { (exact + 0.5) as u32 }
         };
         let mut new: Vec<u32> = supply.iter().zip(known).map(level).collect();
@@ -118,7 +119,7 @@ impl SegmentColors {
         ranges
     }
 
-    /// How far a supply has to be from its step to take another, in steps.
+    /// Distance of a supply from its level at which the level changes, in levels.
     const SUPPLY_REST: f32 = 0.75;
 
     /// Linear sRGB of one segment.
@@ -142,7 +143,7 @@ impl SegmentColors {
     }
 }
 
-/// Widens the scale to whole octaves around the radii; says whether that was necessary.
+/// Widens the scale to whole octaves around the radii. Returns whether that was necessary.
 fn widen_radii<'a>(thinnest: &mut f32, widest: &mut f32, radii: impl Iterator<Item = &'a f32>) -> bool {
     let (low, high) = radii
         .filter(|radius| radius.is_normal() && **radius > 0.0)
@@ -158,7 +159,7 @@ fn widen_radii<'a>(thinnest: &mut f32, widest: &mut f32, radii: impl Iterator<It
     true
 }
 
-/// Runs of indices at which `new` has something else than `old`, what is beyond the end of `old` left out.
+/// Runs of indices at which `new` differs from `old`, up to the end of `old`.
 fn differing_ranges(old: &[u32], new: &[u32]) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = Vec::new();
     for (i, _) in old.iter().zip(new).enumerate().filter(|(_, (a, b))| a != b) {
@@ -172,17 +173,17 @@ fn differing_ranges(old: &[u32], new: &[u32]) -> Vec<Range<usize>> {
 
 const RAMP_LENGTH: usize = 256;
 
-/// The ramp from dark violet by teal to light yellow, at `t` from 0 to 1, linear sRGB. Outside: the nearer end; NaN: the
-/// first colour.
+/// The ramp from dark violet by teal to light yellow, at `t` from 0 to 1, linear sRGB. Outside: the nearer end. NaN:
+/// the first colour.
 ///
-/// A curve of constant speed in Oklab (Ottosson 2020): lightness rises and hue turns evenly at one chroma, so equal steps
-/// of `t` look equally far apart, and order survives in grey and for colour-blind eyes, by lightness. The hues are those
-/// that flesh doesn't have.
+/// A curve of constant speed in Oklab (Ottosson 2020): lightness rises and hue turns evenly at constant chroma, so
+/// equal steps of `t` look equally far apart. Lightness keeps the order in grey and for colour-blind viewers. The hues
+/// differ from those of flesh.
 pub fn ramp_color(t: f32) -> [f32; 3] {
     static RAMP: LazyLock<[[f32; 3]; RAMP_LENGTH]> =
         LazyLock::new(|| std::array::from_fn(|i| linear_srgb(oklab_on_ramp(i as f32 / (RAMP_LENGTH - 1) as f32))));
     let last = (RAMP_LENGTH - 1) as f32;
-    // `as` takes NaN to 0
+    // `as` turns NaN into 0
     RAMP[(t.clamp(0.0, 1.0) * last + 0.5) as usize]
 }
 
@@ -219,7 +220,7 @@ mod tests {
         0.2126 * r + 0.7152 * g + 0.0722 * b
     }
 
-    /// A tree of the given parents on a line, radii given.
+    /// A tree on a line with the given parents and radii.
     fn tree(parents: &[u32], radii: &[f32]) -> VesselTree {
         let positions = (0..parents.len()).map(|i| Vec3::new(i as f32, (i * i) as f32, 0.0)).collect();
         VesselTree::from_arrays(positions, parents.to_vec(), radii.to_vec()).unwrap()

@@ -1,14 +1,14 @@
-//! Which whole segments beside a cut are drawn with a flat end.
+//! Finds the whole segments beside a cut that are drawn with a flat end.
 //!
-//! In: the tips of severed vessels, from [`Wounds`], and their tree. Out: [`FlatEnds`], and which segments look otherwise
-//! than before when wounds were made or undone.
+//! In: the tips of severed vessels, from [`Wounds`], and their tree. Out: [`FlatEnds`], and the segments whose look
+//! changes when wounds are made or undone.
 //!
-//! Where segments are shorter than they are wide, the round ends of whole segments near a tip would reach past it and hide
-//! the gap, or fill the lumen that one looks into. Those are drawn flat, where the next segment covers that.
+//! If segments are shorter than they are wide, the round ends of whole segments near a tip would reach past it and hide
+//! the gap, or fill the visible lumen. These ends are drawn flat, if the next segment covers them.
 //!
-//! What a tip flattens follows from where it lies in its tree alone: not from the order of cuts, nor from what else was
-//! done. So a tip that comes or goes is one small change, and undo leaves no trace. Segments beyond the next gap, which
-//! are not seen through the lumen, are flattened with the others: they are flat for that gap's own tip.
+//! The ends that a tip flattens depend only on its place in the tree: not on the order of cuts, nor on other actions.
+//! So a new or removed tip is one small change, and undo leaves no trace. Segments beyond the next gap, which are not
+//! visible through the lumen, are flattened, too: they are also flat for that gap's own tip.
 
 use crate::synthesis::{
     instances::{END_DOME, LUMEN_DEPTH, MAX_FLARE, START_DOME},
@@ -21,21 +21,21 @@ use std::{
     ops::Range,
 };
 
-/// How wide another branch may be, as a share of a vessel, that this vessel is drawn flat where both leave it. A wider one
-/// would be seen to end in the air.
+/// Largest relative width of another branch beside which a vessel's end is drawn flat. A wider branch would visibly end
+/// in the air.
 const THIN_BRANCH: f32 = 0.5;
 
-/// Which segments of a cut tree are drawn with a flat end for the sake of a gap beside them.
+/// The segments of a cut tree that are drawn with a flat end because of a gap beside them.
 ///
-/// It holds what follows from the wounds and the tree that it last saw. A cut needs an [`update`](Self::update) with the
-/// segments that the cut changed; a tree that grew, moved or was replaced, a [`rebuild`](Self::rebuild).
+/// It is derived from the wounds and the tree of the last call. After a cut, call [`update`](Self::update) with the
+/// segments that the cut changed; after a tree grew, moved or was replaced, call [`rebuild`](Self::rebuild).
 ///
 /// `children(node)` gives the children of a node, as [`Children::of`](crate::synthesis::tree::sweep::Children::of) does.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlatEnds {
-    /// What the tips of each severed segment flatten, by node. None is empty.
+    /// The ends that the tips of each severed segment flatten, by node. No list is empty.
     of_tips: BTreeMap<u32, Vec<FlatEnd>>,
-    /// How many times each segment is flattened at its start and at its end, by node. None is 0 at both.
+    /// Number of tips that flatten each segment at its start and at its end, by node. None is 0 at both.
     counts: BTreeMap<u32, [u32; 2]>,
 }
 
@@ -49,7 +49,7 @@ struct FlatEnd {
 }
 
 impl FlatEnds {
-    /// Those of all wounds of a tree.
+    /// The flat ends for all wounds of a tree.
     pub fn new<C: IntoIterator<Item = NodeId>>(
         wounds: &Wounds,
         tree: &VesselTree,
@@ -60,11 +60,11 @@ impl FlatEnds {
         flat
     }
 
-    /// Takes in what became of the tips of some segments: of all that a cut or an undo
-    /// [changed](crate::synthesis::wound::WoundReport::changed); more of them change nothing.
+    /// Updates the flat ends for the tips of some segments: all that a cut or an undo
+    /// [changed](crate::synthesis::wound::WoundReport::changed); others do no harm.
     ///
-    /// Returns the segments that look otherwise now, in rising order. Those whose own pieces changed are not among them
-    /// unless they also do for another's sake. The cost is that of the segments given.
+    /// Returns the segments whose look changed because of another, in rising order. The cost is that of the segments
+    /// given.
     pub fn update<C: IntoIterator<Item = NodeId>>(
         &mut self,
         wounds: &Wounds,
@@ -92,8 +92,8 @@ impl FlatEnds {
         others.into_iter().collect()
     }
 
-    /// Takes in all wounds, for a tree that is other than before. Returns the same as [`update`](Self::update). The cost is
-    /// that of all severed segments.
+    /// Updates the flat ends for all wounds, after the tree changed. Returns the same as [`update`](Self::update). The
+    /// cost is that of all severed segments.
     pub fn rebuild<C: IntoIterator<Item = NodeId>>(
         &mut self,
         wounds: &Wounds,
@@ -110,17 +110,17 @@ impl FlatEnds {
         self.counts.get(&node.0).map_or([false; 2], |counts| counts.map(|count| count > 0))
     }
 
-    /// Whether the segment of a node is drawn otherwise than it grew, by [`write_stumps_of`](super::write_stumps_of):
+    /// Whether [`write_stumps_of`](super::write_stumps_of) draws the segment of a node differently than it grew:
     /// because it is severed, or because its round end would hide the gap of another.
     pub fn is_redrawn(&self, wounds: &Wounds, node: NodeId) -> bool {
         self.counts.contains_key(&node.0) || wounds.is_severed(node)
     }
 
-    /// The segments of a range of nodes that are drawn otherwise than they grew, in their order, at the cost of those that
-    /// anything was done to.
+    /// The segments of a range of nodes that are drawn differently than they grew, in order. The cost is that of the
+    /// affected segments.
     pub fn redrawn_within<'a>(&'a self, wounds: &'a Wounds, nodes: Range<usize>) -> impl Iterator<Item = NodeId> + 'a {
         let bound = |node: usize| u32::try_from(node).unwrap_or(u32::MAX);
-        // An empty range may lie anywhere: a map takes none that is the wrong way round.
+        // An empty range may be inverted, which a map does not accept.
         let range = bound(nodes.start)..bound(nodes.end.max(nodes.start));
         let mut flat = self.counts.range(range).map(|(&node, _)| NodeId(node)).peekable();
         let mut severed = wounds.severed_within(nodes).peekable();
@@ -132,7 +132,7 @@ impl FlatEnds {
         })
     }
 
-    /// Puts what the tips of a segment flatten in place of what they did, and takes note of how what that touches was.
+    /// Replaces the ends that the tips of a segment flatten, and records the previous sides of the touched segments.
     fn replace(&mut self, node: NodeId, flattened: &[FlatEnd], touched: &mut BTreeMap<u32, [bool; 2]>) {
         let known = self.of_tips.get(&node.0).map_or(&[][..], Vec::as_slice);
         if known == flattened {
@@ -159,7 +159,7 @@ impl FlatEnds {
     }
 }
 
-/// How far a tip's surroundings are flattened.
+/// Finds the ends that a tip flattens.
 struct Reach<'a, F> {
     tree: &'a VesselTree,
     children: &'a F,
@@ -167,8 +167,8 @@ struct Reach<'a, F> {
 }
 
 impl<C: IntoIterator<Item = NodeId>, F: Fn(NodeId) -> C> Reach<'_, F> {
-    /// Flattens whole segments whose round ends would reach past a tip, or into its lumen. A tip that is not of the tree
-    /// has none.
+    /// Flattens whole segments whose round ends would reach past a tip, or into its lumen. A tip outside the tree
+    /// flattens none.
     fn flatten_around(&mut self, tip: Place, side: EndSide) {
         let Some(&radius) = self.tree.radii().get(tip.node.index()) else { return };
         let lumen = f64::from(LUMEN_DEPTH * radius);
@@ -179,7 +179,7 @@ impl<C: IntoIterator<Item = NodeId>, F: Fn(NodeId) -> C> Reach<'_, F> {
         }
     }
 
-    /// Those towards the root from a tip, which lies `distance` behind the beginning of its segment.
+    /// Flattens segments from a tip, which lies `distance` beyond the start of its segment, towards the root.
     fn flatten_above(&mut self, mut child: NodeId, mut distance: f64, lumen: f64) {
         let tree = self.tree;
         while let Some(node) = tree.parent(child).filter(|&node| tree.parent(node).is_some()) {
@@ -193,7 +193,7 @@ impl<C: IntoIterator<Item = NodeId>, F: Fn(NodeId) -> C> Reach<'_, F> {
         }
     }
 
-    /// Whether a child goes on with the whole width of a segment, so that the end of that is not seen.
+    /// Whether a child continues a segment with its whole width, so that the segment's end is not visible.
     fn is_continued(&self, node: NodeId, child: NodeId) -> bool {
         let radii = self.tree.radii();
         let radius = radii[node.index()];
@@ -201,8 +201,8 @@ impl<C: IntoIterator<Item = NodeId>, F: Fn(NodeId) -> C> Reach<'_, F> {
         radius <= MAX_FLARE * radii[child.index()] && (self.children)(node).into_iter().all(is_thin)
     }
 
-    /// Those towards the tips, of which each begins within the round end of another: from the end of a segment, to
-    /// where it is `distance` from the tip.
+    /// Flattens segments towards the tips, each of which begins within the round end of another: from the end of a
+    /// segment, which is `distance` from the tip.
     fn flatten_below(&mut self, node: NodeId, distance: f64, lumen: f64) {
         let mut ends = vec![(node, distance)];
         while let Some((node, distance)) = ends.pop() {
@@ -216,7 +216,7 @@ impl<C: IntoIterator<Item = NodeId>, F: Fn(NodeId) -> C> Reach<'_, F> {
         }
     }
 
-    /// In f64, since a segment may be too short for the square of its length in f32.
+    /// In f64, since the square of a short length may underflow in f32.
     fn length(&self, node: NodeId) -> f64 {
         let positions = self.tree.positions();
         let start = self.tree.parent(node).map_or(positions[node.index()], |parent| positions[parent.index()]);

@@ -1,11 +1,11 @@
-//! Segments as a renderer takes them: one record of 48 bytes per node.
+//! Segments in the form that a renderer needs: one record of 48 bytes per node.
 //!
 //! In: a [`VesselTree`], the step in which each node was born and a [`SegmentColors`]. Out: [`SegmentInstance`]s, slot `i`
 //! for node `i`, that is, for the segment from its parent to it. A root has no segment, so its slot is
-//! [`SegmentInstance::HIDDEN`] and draws nothing. Because slots share the nodes' indices, a growth step rewrites exactly
-//! the ranges of nodes that it touched.
+//! [`SegmentInstance::HIDDEN`] and draws nothing. Slots share the nodes' indices, so a growth step rewrites exactly the
+//! ranges of nodes that it touched.
 //!
-//! Of cut vessels, [`write_stumps`] writes what is left, with [`FlatEnds`] beside the gaps.
+//! For cut vessels, [`write_stumps`] writes the remaining pieces, with [`FlatEnds`] beside the gaps.
 
 use crate::synthesis::{
     segment_index::start_radius,
@@ -23,27 +23,27 @@ pub use colors::{SegmentColors, ramp_color};
 pub use flat_ends::FlatEnds;
 pub use stumps::{write_stumps, write_stumps_of};
 
-/// How far the round end of a segment reaches beyond its end, in radii. The shader has the same three numbers.
+/// Length of the round end of a segment beyond its end, in radii. The shader has the same three numbers.
 pub(crate) const END_DOME: f32 = 1.0;
 /// The same beyond its start, where the dome is shallow.
 pub(crate) const START_DOME: f32 = 0.4;
-/// How deep one looks into the lumen of an open end, in radii.
+/// Visible depth of the lumen of an open end, in radii.
 pub(crate) const LUMEN_DEPTH: f32 = 1.2;
 
 /// One vessel segment: a cone with round ends, in tissue lengths.
 ///
-/// An end at which the vessel was cut is open: flat, with a view into the lumen. Its radius is stored as a negative number.
-/// So is one inside a vessel that was cut nearby, where a round end would be seen in the gap.
+/// An end at which the vessel was cut is open: flat, with a view into the lumen. Its radius is stored as a negative
+/// number. The same holds for an end inside a vessel that was cut nearby, if a round end would be visible in the gap.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SegmentInstance {
     /// Centre of the end towards the root.
     pub start: [f32; 3],
-    /// Radius at `start`, negative where that is [open](Self::is_open).
+    /// Radius at `start`, negative if that is [open](Self::is_open).
     pub start_radius: f32,
     /// Centre of the end towards the tips.
     pub end: [f32; 3],
-    /// Radius at `end`, negative where that is open.
+    /// Radius at `end`, negative if that is open.
     pub end_radius: f32,
     /// Linear sRGB.
     pub color: [f32; 3],
@@ -52,7 +52,7 @@ pub struct SegmentInstance {
 }
 
 impl SegmentInstance {
-    /// The slot of a root, and of no node at all: draws nothing.
+    /// The slot of a root, or of no node: draws nothing.
     pub const HIDDEN: Self =
         Self { start: [0.0; 3], start_radius: 0.0, end: [0.0; 3], end_radius: 0.0, color: [0.0; 3], birth: 0.0 };
 
@@ -69,7 +69,7 @@ impl SegmentInstance {
         [self.start_radius.abs(), self.end_radius.abs()]
     }
 
-    /// Whether the vessel was cut at `start`, at `end`, and one looks into its lumen there.
+    /// Whether the vessel is open at `start` and at `end`, with a view into its lumen.
     pub fn is_open(&self) -> [bool; 2] {
         [self.start_radius < 0.0, self.end_radius < 0.0]
     }
@@ -82,13 +82,13 @@ impl SegmentInstance {
     }
 }
 
-/// Writes the segments of the nodes in `range` to `out` and returns the box around those that are visible.
+/// Writes the segments of the nodes in `range` to `out`, and returns the box around the visible ones.
 ///
-/// `birth_steps` has the step of each node; a node past its end counts as born in step 0. What `out` has room for beyond
-/// the range is hidden, so a caller that hands over whole chunks needs no clearing of its own. `None`: nothing visible.
+/// `birth_steps` has the step of each node; a node past its end counts as born in step 0. Slots of `out` beyond the
+/// range are hidden, so a caller that passes whole chunks need not clear them. Returns `None` if nothing is visible.
 ///
 /// # Panics
-/// When the range leaves the tree or is longer than `out`.
+/// If the range leaves the tree or is longer than `out`.
 pub fn write_segments(
     tree: &VesselTree,
     birth_steps: &[u32],
@@ -110,10 +110,10 @@ pub fn write_segments(
     bounds
 }
 
-/// The box around the visible segments of the nodes in `range`, `None` when there is none.
+/// The box around the visible segments of the nodes in `range`, `None` if there is none.
 ///
 /// # Panics
-/// When the range leaves the tree.
+/// If the range leaves the tree.
 pub fn segment_bounds(tree: &VesselTree, range: Range<usize>) -> Option<Aabb3d> {
     let colors = SegmentColors::Uniform([0.0; 3]);
     range

@@ -1,7 +1,7 @@
-//! What is drawn of cut vessels.
+//! The drawing of cut vessels.
 //!
-//! In: [`Wounds`] and their tree, with the [`FlatEnds`] that follow from both. Out: [`SegmentInstance`]s for the pieces that
-//! are left of severed segments, and for whole ones beside them that are drawn otherwise than they grew.
+//! In: [`Wounds`] and their tree, with the [`FlatEnds`] that follow from both. Out: [`SegmentInstance`]s for the
+//! remaining pieces of severed segments, and for whole ones beside them that are drawn differently than they grew.
 
 use crate::synthesis::{
     instances::{END_DOME, FlatEnds, START_DOME, SegmentColors, SegmentInstance, segment_instance},
@@ -10,15 +10,15 @@ use crate::synthesis::{
 };
 use bevy_math::Vec3;
 
-/// Most of a piece that the round ends of its cuts may take.
+/// Largest share of a piece that the round ends of its cuts may take.
 const MOST_DOME: f32 = 0.9;
 
-/// Appends to `out` what is left of the severed segments, and those beside them that are drawn otherwise, as instances: in
-/// the order of their nodes, then from parent to node. Their own slots are to be hidden while
+/// Appends to `out` instances of the remaining pieces of severed segments, and of those beside them that are drawn
+/// differently: in the order of their nodes, then from parent to node. Hide their own slots while
 /// [`FlatEnds::is_redrawn`].
 ///
-/// `birth_steps` and `colors` as for [`write_segments`](super::write_segments); `flat` has to be up to date with the wounds
-/// and the tree.
+/// `birth_steps` and `colors` as for [`write_segments`](super::write_segments); `flat` must be up to date with the
+/// wounds and the tree.
 pub fn write_stumps(
     wounds: &Wounds,
     flat: &FlatEnds,
@@ -32,12 +32,12 @@ pub fn write_stumps(
     }
 }
 
-/// Appends what is left of one segment; nothing if it is drawn as it grew, wholly taken out, or not of the tree.
+/// Appends the remaining pieces of one segment; nothing if it is drawn as it grew, wholly removed, or not in the tree.
 ///
-/// A piece is drawn with the taper that the whole segment has. An end with a lumen is
-/// [open](SegmentInstance::is_open), and ends flat. A sealed one is round; its round end stays within the piece, and one
-/// too short for it ends more bluntly. Whole segments whose round ends would reach past it are open, too, where the next
-/// segment covers that. So gaps are as wide as the ledger has them.
+/// A piece is drawn with the taper of the whole segment. An end with a lumen is [open](SegmentInstance::is_open), and
+/// flat. A sealed end is round; its round end stays within the piece, and is blunter if the piece is too short. Whole
+/// segments whose round ends would reach past it are open, too, if the next segment covers them. So gaps are as wide as
+/// in the ledger.
 pub fn write_stumps_of(
     wounds: &Wounds,
     flat: &FlatEnds,
@@ -61,8 +61,8 @@ pub fn write_stumps_of(
     }
 }
 
-/// How far a segment is drawn into its parent, to cover the rim of that where it is flat and the vessel bends there. 0
-/// where the parent has its round end.
+/// Length by which a segment is drawn into its parent, to cover the rim of a flat parent where the vessel bends. 0 if
+/// the parent has its round end.
 fn cover(flat: &FlatEnds, tree: &VesselTree, node: NodeId) -> f32 {
     let parent = tree.parent(node).filter(|&parent| flat.sides(parent)[1]);
     let Some(parent) = parent else { return 0.0 };
@@ -72,18 +72,18 @@ fn cover(flat: &FlatEnds, tree: &VesselTree, node: NodeId) -> f32 {
     sine * tree.radii()[parent.index()]
 }
 
-/// How an end is drawn.
+/// The shape of a drawn end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum EndShape {
-    /// With the round end of a whole segment, which reaches beyond it.
+    /// The round end of a whole segment, which reaches beyond it.
     Round,
-    /// With a round end that stays within the piece.
+    /// A round end that stays within the piece.
     Sealed,
     /// Flat, with a view into the lumen.
     Flat,
 }
 
-/// How a piece is drawn at its ends. Those in a node are flat where the segment is.
+/// The shapes of a piece's ends. An end at a node is flat if the segment is flat there.
 fn shapes(ends: [PieceEnd; 2], flat: [bool; 2]) -> [EndShape; 2] {
     let shape = |end: PieceEnd, is_flat: bool| match end {
         PieceEnd::Node if !is_flat => EndShape::Round,
@@ -102,7 +102,7 @@ fn draw(whole: &SegmentInstance, [from, to]: [f32; 2], ends: [EndShape; 2], cove
         if ends[0] == EndShape::Sealed { START_DOME * radius(from) } else { 0.0 },
         if ends[1] == EndShape::Sealed { END_DOME * radius(to) } else { 0.0 },
     ];
-    // How much of their size the round ends have room for.
+    // Share of their size for which the round ends have room.
     let fit = (room / (domes[0] + domes[1]).max(f32::MIN_POSITIVE)).min(1.0);
     let [mut back, ahead] = domes.map(|dome| fit * dome / length);
     if ends[0] == EndShape::Round {

@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all.
+//! Files that are written whole or not at all.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -6,50 +6,50 @@ use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Why a file was not written. What was at its path before is still there, unchanged.
+/// The reason why a file was not written. The old file at its path is unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The path ends in no file name.
+    /// The path has no file name.
     #[error("{} names no file; add a file name", path.display())]
     NoFileName {
         /// The path given.
         path: PathBuf,
     },
-    /// No file can be made in the folder: it is missing, or closed to this user.
+    /// No file can be created in the folder: it is missing, or the user has no permission.
     #[error("cannot create a file beside {}: {source}", path.display())]
     Create {
         /// The path given.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// The content was not written to its end: the disk is full, or its source failed.
+    /// The content could not be written completely: the disk is full, or its source failed.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// The path given.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// The finished file cannot take its name: a folder has it, or another program holds it.
+    /// The finished file cannot be renamed: a folder has that name, or another program holds the file.
     #[error("cannot replace {}: {source}", path.display())]
     Replace {
         /// The path given.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
 }
 
-/// Writes a file so that at every moment its path holds either what was there before or the whole new content.
+/// Writes a file so that its path always holds either the old or the whole new content.
 ///
-/// The content goes to a temporary file in the same folder, is flushed and synchronised with the disk, and takes the
-/// name of the file in one rename. If anything fails, or `write` panics, the temporary file is removed. A process that
-/// is killed can leave one behind, with a name that ends in `.tmp`; nothing reads it. A symbolic link at the path is
-/// replaced, not followed. A file that is replaced hands its permissions on.
+/// The content goes to a temporary file in the same folder, which is flushed, synchronised with the disk, and renamed
+/// to the file in one step. If anything fails, or `write` panics, the temporary file is removed. A process that is
+/// killed can leave one behind, with a name that ends in `.tmp`; nothing reads it. A symbolic link at the path is
+/// replaced, not followed. A replaced file passes on its permissions.
 ///
 /// # Errors
-/// What failed, with the path. The file at the path is then as it was.
+/// The failure, with the path. The file at the path is unchanged then.
 pub fn write_atomically(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -81,7 +81,7 @@ struct Temporary {
 }
 
 impl Temporary {
-    /// How many names are tried before giving up on a folder full of leftovers.
+    /// Number of names tried before giving up on a folder full of leftovers.
     const TRIES: u32 = 1000;
 
     /// Makes a new, empty file in the folder of `target`, under a name that no other file, thread or process has.
@@ -113,13 +113,13 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if !self.is_done {
-            // Nothing better can be done about a file that cannot be removed; the first error is the one to report.
+            // Nothing can be done about a file that cannot be removed; the first error is reported.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// Makes the new name survive a power cut, where folders can be synchronised. The content is safe either way.
+/// Makes the new name survive a power cut, if folders can be synchronised. The content is safe either way.
 #[cfg(unix)]
 fn sync_folder(target: &Path) {
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

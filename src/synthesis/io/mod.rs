@@ -1,8 +1,8 @@
 //! Files: trees are written as SWC, OBJ and CSV, and read from SWC; organ meshes are read from GLB, glTF and OBJ with the
 //! feature `mesh_files`.
 //!
-//! Every format has a function that writes to any [`std::io::Write`], such as [`write_swc`], and one that writes a file,
-//! such as [`save_swc`]. Files are there whole or not at all, by [`write_atomically`].
+//! Every format has a function that writes to any [`std::io::Write`], such as [`write_swc`], and one that writes a
+//! file, such as [`save_swc`]. Files are written whole or not at all, by [`write_atomically`].
 //!
 //! ```
 //! use bevy_vessels::synthesis::{
@@ -21,8 +21,8 @@
 //! # }
 //! ```
 //!
-//! Numbers are written with a decimal point whatever the locale, with as many digits as it takes to read the same value
-//! back, so the same tree gives the same bytes everywhere.
+//! Numbers are written with a decimal point in any locale, with as many digits as needed to read the same value back,
+//! so the same tree gives the same bytes everywhere.
 
 mod atomic;
 mod mesh;

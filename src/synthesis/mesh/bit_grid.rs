@@ -1,4 +1,4 @@
-//! Voxels that are set, with their number before each: a list and its inverse in little more than a bit a voxel.
+//! A set of voxels with ranks: a list and its inverse in little more than one bit per voxel.
 
 use crate::synthesis::pace::{Pace, STRETCH};
 
@@ -10,7 +10,7 @@ pub(crate) struct BitGrid {
 }
 
 impl BitGrid {
-    /// A grid in which the voxels are set that so many candidates turn out to be.
+    /// A grid with the voxels that `set` returns for each of so many candidates.
     pub async fn new(len: usize, candidates: usize, set: impl Fn(usize) -> Option<usize>, pace: &Pace) -> Self {
         let mut words = vec![0u64; len.div_ceil(64)];
         let add = |candidate: usize| {
@@ -33,13 +33,13 @@ impl BitGrid {
         self.words[voxel / 64] >> (voxel % 64) & 1 == 1
     }
 
-    /// How many voxels before this one are set.
+    /// Number of set voxels before this one.
     pub fn rank(&self, voxel: usize) -> usize {
         let below = self.words[voxel / 64] & ((1u64 << (voxel % 64)) - 1);
         self.ranks[voxel / 64] as usize + below.count_ones() as usize
     }
 
-    /// The voxels that are set as a list, in order.
+    /// A list of the set voxels, in order.
     pub async fn list(&self, pace: &Pace) -> Vec<u32> {
         // Room for all, since a list that outgrows its room is copied without a rest.
         let count = self.words.last().zip(self.ranks.last()).map_or(0, |(word, before)| before + word.count_ones());
@@ -52,7 +52,7 @@ impl BitGrid {
         list
     }
 
-    /// The voxels that are set, in order.
+    /// The set voxels, in order.
     pub fn iter(&self) -> impl Iterator<Item = usize> {
         self.words.iter().enumerate().flat_map(|(index, &word)| {
             let mut left = word;

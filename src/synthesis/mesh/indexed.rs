@@ -1,4 +1,4 @@
-//! A mesh with the index of its triangles, shared: for values that belong to its vertices and are asked for anywhere.
+//! A shared mesh with an index of its triangles, to evaluate vertex values anywhere.
 
 use super::{SurfacePoint, TriangleIndex, TriangleMesh};
 use crate::synthesis::pace::{Pace, at_once};
@@ -18,7 +18,7 @@ impl IndexedMesh {
         at_once(Self::new_paced(mesh.into(), &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub async fn new_paced(mesh: Arc<TriangleMesh>, pace: &Pace) -> Self {
         let index = Arc::new(TriangleIndex::new_paced(&mesh, pace).await);
         Self { mesh, index }
@@ -37,16 +37,16 @@ impl IndexedMesh {
     /// The value at a point of the mesh, given one value for each vertex: linear over each triangle.
     ///
     /// # Panics
-    /// When there are fewer values than vertices.
+    /// If there are fewer values than vertices.
     pub fn value_at(&self, point: &SurfacePoint, values: &[f32]) -> f32 {
         let corners = self.mesh.triangles()[point.triangle].map(|vertex| values[vertex as usize]);
         Vec3::from_array(corners).dot(point.barycentric)
     }
 
-    /// The value at the point of the mesh nearest to `point`; `None` where that is not finite.
+    /// The value at the point of the mesh nearest to `point`; `None` if that is not finite.
     ///
     /// # Panics
-    /// When there are fewer values than vertices.
+    /// If there are fewer values than vertices.
     pub fn value_near(&self, point: Vec3, values: &[f32]) -> Option<f32> {
         self.index.closest(point).map(|found| self.value_at(&found, values))
     }

@@ -1,15 +1,17 @@
-//! Meshes: triangles of organs, checked once; the same with all that drawing needs; tetrahedra of soft bodies.
+//! Meshes: triangles of organs, checked once; meshes with all drawing attributes; tetrahedra of soft bodies.
 //!
-//! In: positions and indices as a file or an engine's mesh holds them. Out: a [`TriangleMesh`] that every later stage can
-//! work with, its [`topology`], an index of its triangles ([`TriangleIndex`]) and its voxels.
+//! In: positions and indices, as in a file or an engine's mesh. Out: a [`TriangleMesh`] that every later stage can use,
+//! its [`topology`], an index of its triangles ([`TriangleIndex`]) and its voxels.
 
 pub(crate) mod bit_grid;
+pub(crate) mod crossing;
 mod indexed;
 mod shaded;
 pub(crate) mod tet_mesh;
 pub mod topology;
 pub mod triangle_index;
 mod triangle_mesh;
+mod vertex_normals;
 pub(crate) mod voxels;
 mod welding;
 pub(crate) mod winding;

@@ -1,10 +1,10 @@
-//! A mesh with all that drawing it needs: what organs, surfaces and files exchange.
+//! A mesh with all drawing attributes, exchanged by organs, surfaces and files.
 
 use super::{MeshError, TriangleMesh};
 use bevy_math::{Vec2, Vec3};
 use std::ops::Range;
 
-/// Triangles of an organ with all that drawing them needs.
+/// Triangles of an organ with all drawing attributes.
 ///
 /// Positions are in metres, normals are unit vectors that point out of the tissue, triangles wind counter-clockwise seen
 /// from outside. The surface is closed once vertices at equal positions are welded: along the seams of the UV chart a
@@ -13,11 +13,11 @@ use std::ops::Range;
 pub struct ShadedMesh {
     /// Vertex positions, in metres.
     pub positions: Vec<Vec3>,
-    /// Unit vertex normals, one a vertex.
+    /// Unit normals, one per vertex.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates in [0, 1]², one a vertex. What they run along is said by each organ.
+    /// Texture coordinates in [0, 1]², one per vertex. Each organ documents their directions.
     pub uvs: Vec<Vec2>,
-    /// Tissue colour, linear RGB with an alpha of 1, one a vertex.
+    /// Tissue colours, linear RGB with an alpha of 1, one per vertex.
     pub colors: Vec<[f32; 4]>,
     /// Triangles, as indices into the vertices.
     pub triangles: Vec<[u32; 3]>,
@@ -47,15 +47,16 @@ impl ShadedMesh {
         part
     }
 
-    /// The triangles as every stage reads them, UVs included.
+    /// The checked triangles for all stages, with UVs.
     ///
     /// # Errors
-    /// Those of [`TriangleMesh::new`], which no mesh of a generator or part of it meets, unless it is an empty part.
+    /// Those of [`TriangleMesh::new`]. Meshes of organs and their parts have none, except an empty part.
     pub fn triangle_mesh(&self) -> Result<TriangleMesh, MeshError> {
         TriangleMesh::new(self.positions.clone(), self.triangles.clone(), Some(self.uvs.clone()))
     }
 
-    /// Volume that the surface encloses, in cubic metres; negative when it is inside out. Meaningful for closed meshes.
+    /// Volume enclosed by the surface, in cubic metres; negative if it is inside out. Only meaningful for closed
+    /// meshes.
     pub fn signed_volume(&self) -> f32 {
         let six_volumes: f64 = self
             .triangles
@@ -76,7 +77,7 @@ impl ShadedMesh {
 
     /// Sets the normals from the triangles, weighted by area.
     ///
-    /// `shared[v]` names the vertex whose normal `v` shares, itself where it stands alone: seams then do not show.
+    /// `shared[v]` is the vertex whose normal `v` shares, or `v` itself, so that seams don't show.
     pub(crate) fn compute_normals(&mut self, shared: &[u32]) {
         let mut sums = vec![Vec3::ZERO; self.positions.len()];
         for corners in &self.triangles {

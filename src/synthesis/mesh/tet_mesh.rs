@@ -13,9 +13,9 @@ pub enum TetMeshError {
     /// More vertices or tetrahedra than [`MAX_TRIANGLES`].
     #[error("the mesh has {count} {what}, more than {MAX_TRIANGLES}; use a coarser one")]
     TooLarge {
-        /// What there is too much of.
+        /// What exceeds the limit.
         what: &'static str,
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
     /// A vertex with a NaN or infinite coordinate, or one beyond [`MAX_COORDINATE`].
@@ -25,7 +25,7 @@ pub enum TetMeshError {
     BadPosition {
         /// The first such vertex.
         vertex: usize,
-        /// Where it is.
+        /// Its position.
         position: Vec3,
     },
     /// A tetrahedron with a vertex that does not exist.
@@ -50,7 +50,7 @@ pub enum TetMeshError {
     },
 }
 
-/// Tetrahedra that fill an organ, as a soft body has them, checked by [`new`](Self::new).
+/// Tetrahedra that fill an organ, such as those of a soft body, checked by [`new`](Self::new).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize), serde(try_from = "TetMeshArrays"))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
@@ -59,7 +59,7 @@ pub struct TetMesh {
     tetrahedra: Vec<[u32; 4]>,
 }
 
-/// Tetrahedra that were read from a file, before they are checked.
+/// Tetrahedra read from a file, still unchecked.
 #[cfg(feature = "serialize")]
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -78,11 +78,11 @@ impl TryFrom<TetMeshArrays> for TetMesh {
 }
 
 impl TetMesh {
-    /// Checks and takes over a mesh. The corners of a tetrahedron may stand in any order; degenerate ones are kept, and
+    /// Checks and takes over a mesh. The corners of a tetrahedron may have any order; degenerate ones are kept, and
     /// nothing is bound to them.
     ///
     /// # Errors
-    /// The first thing that makes the mesh useless: see [`TetMeshError`].
+    /// The first error that makes the mesh unusable: see [`TetMeshError`].
     pub fn new(positions: Vec<Vec3>, tetrahedra: Vec<[u32; 4]>) -> Result<Self, TetMeshError> {
         let vertices = positions.len();
         for (what, count) in [("vertices", vertices), ("tetrahedra", tetrahedra.len())] {
@@ -116,14 +116,14 @@ impl TetMesh {
         &self.tetrahedra
     }
 
-    /// Whether a tetrahedron has no volume to speak of.
+    /// Whether a tetrahedron has no significant volume.
     ///
     /// # Panics
-    /// When there is no such tetrahedron.
+    /// If there is no such tetrahedron.
     pub fn is_degenerate(&self, tetrahedron: usize) -> bool {
         let edges = edges(self.corners(tetrahedron));
         let longest = edges.x_axis.length().max(edges.y_axis.length()).max(edges.z_axis.length());
-        // NaN and a longest edge of 0 fail it too.
+        // NaN and a longest edge of 0 fail it, too.
         let has_volume = edges.determinant().abs() > DEGENERATE_SHAPE * longest * longest * longest;
         !has_volume
     }
@@ -133,7 +133,7 @@ impl TetMesh {
     }
 }
 
-/// From the first corner to the others.
+/// Vectors from the first corner to the others.
 pub(crate) fn edges([a, b, c, d]: [Vec3; 4]) -> DMat3 {
     let [a, b, c, d] = [a, b, c, d].map(|corner| corner.as_dvec3());
     DMat3::from_cols(b - a, c - a, d - a)

@@ -1,4 +1,4 @@
-//! How the triangles of a mesh hang together once vertices at the same position count as one.
+//! Connectivity of a mesh's triangles, with vertices at the same position welded.
 
 use super::{
     TriangleMesh, Welding,
@@ -7,7 +7,7 @@ use super::{
 use crate::synthesis::pace::{Pace, Stretch, at_once};
 use std::collections::VecDeque;
 
-/// An edge between two welded vertices, in one of its triangles. Uses of the same edge are side by side in their order.
+/// An edge between two welded vertices, in one of its triangles. Their order puts uses of the same edge side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct EdgeUse {
     /// The lower vertex in the upper half, the higher in the lower half.
@@ -29,12 +29,12 @@ pub struct MeshTopology {
 }
 
 impl TriangleMesh {
-    /// The welded edges of the mesh, for every question about how it hangs together.
+    /// The welded edges of the mesh, for all queries about its connectivity.
     pub fn topology(&self) -> MeshTopology {
         at_once(self.topology_paced(&Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub async fn topology_paced(&self, pace: &Pace) -> MeshTopology {
         let welding = self.weld_paced(&pace.part(0.0..0.2)).await;
         let mut edges = Vec::with_capacity(3 * self.triangles().len());
@@ -57,9 +57,9 @@ impl TriangleMesh {
         MeshTopology { welding, triangles, edges }
     }
 
-    /// Whether no edge has just one triangle, after welding: the mesh has an inside.
+    /// Whether no edge has just one triangle after welding, so that the mesh has an inside.
     ///
-    /// For more than one question ask [`topology`](Self::topology) once.
+    /// For several queries, call [`topology`](Self::topology) once.
     pub fn is_closed(&self) -> bool {
         self.topology().is_closed()
     }
@@ -71,7 +71,7 @@ impl MeshTopology {
         &self.welding
     }
 
-    /// Number of triangles that have no area.
+    /// Number of triangles without area.
     pub fn degenerate_triangles(&self) -> usize {
         self.triangles.iter().filter(|corners| corners.is_none()).count()
     }
@@ -81,7 +81,7 @@ impl MeshTopology {
         self.fans().count()
     }
 
-    /// Number of edges with one triangle only: 0 where the mesh is closed.
+    /// Number of edges with only one triangle: 0 for a closed mesh.
     pub fn boundary_edges(&self) -> usize {
         self.fans().filter(|fan| fan.len() == 1).count()
     }
@@ -111,15 +111,15 @@ impl MeshTopology {
         true
     }
 
-    /// Which triangles have an edge that is run along more often one way than the other. `flip` says which triangles count
-    /// as reversed.
+    /// Which triangles have an edge that triangles use more often in one direction than in the other. `flip` tells
+    /// which triangles count as reversed.
     ///
-    /// Where there is none, every point is enclosed a whole number of times, from whichever side one looks.
+    /// If there is none, every point has an integer winding number, which is the same along every ray.
     pub fn unbalanced(&self, flip: impl Fn(usize) -> bool) -> Vec<bool> {
         at_once(self.unbalanced_paced(flip, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn unbalanced_paced(&self, flip: impl Fn(usize) -> bool, pace: &Pace) -> Vec<bool> {
         let mut unbalanced = vec![false; self.triangles.len()];
         let (mut stretch, mut done) = (Stretch::default(), 0);
@@ -138,7 +138,7 @@ impl MeshTopology {
         unbalanced
     }
 
-    /// Vertices − edges + triangles, over what non-degenerate triangles use: 2 for a ball, 0 for a torus.
+    /// Vertices − edges + triangles, for non-degenerate triangles: 2 for a ball, 0 for a torus.
     pub fn euler_characteristic(&self) -> i64 {
         let mut used = vec![false; self.welding.count()];
         for &vertex in self.triangles.iter().flatten().flatten() {
@@ -148,27 +148,27 @@ impl MeshTopology {
         vertices as i64 - self.edges() as i64 + self.triangles.iter().flatten().count() as i64
     }
 
-    /// Numbers the connected parts of the mesh: for every triangle the part it belongs to, `None` where it is
-    /// degenerate, and how many parts there are. Triangles are connected across shared edges.
+    /// Numbers the connected parts of the mesh: returns the part of every triangle, `None` if it is degenerate, and the
+    /// number of parts. Triangles are connected across shared edges.
     pub fn components(&self) -> (Vec<Option<u32>>, usize) {
         let patches = at_once(self.patches(|_| true, |_, _, _| {}, &Pace::default()));
         (patches.of_triangle, patches.count)
     }
 
-    /// Which triangles face the other way than the part of the surface around them.
+    /// Which triangles are oriented against the surface around them.
     ///
-    /// Orientation spreads across edges that exactly two triangles share. Of the two ways in which such a part can face,
-    /// the one that most of its area already has is kept, so a mesh that is consistent stays as it is.
+    /// Orientation spreads across edges that exactly two triangles share. Of the two orientations of such a part, the
+    /// one of most of its area is kept, so a consistent mesh stays as it is.
     pub fn misoriented(&self, mesh: &TriangleMesh) -> Vec<bool> {
         at_once(self.misoriented_paced(mesh, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn misoriented_paced(&self, mesh: &TriangleMesh, pace: &Pace) -> Vec<bool> {
         let mut flip = vec![false; self.triangles.len()];
         let turn = |from: usize, to: usize, same_way: bool| flip[to] = flip[from] != same_way;
         let patches = self.patches(|fan| fan.len() == 2, turn, &pace.part(0.0..0.8)).await;
-        // Area of each part that would be flipped, less the area that would stay.
+        // Area of each part that would be flipped, minus the area that would stay.
         let mut balance = vec![0.0; patches.count];
         let weigh = |triangle: usize| {
             if let Some(patch) = patches.of_triangle[triangle] {
@@ -210,10 +210,10 @@ impl MeshTopology {
         self.edges.chunk_by(|a, b| a.key == b.key)
     }
 
-    /// Breadth-first walk over the triangles, across the edges that `joins` lets through.
+    /// Breadth-first traversal of the triangles, across the edges that `joins` accepts.
     ///
-    /// `visit(from, to, same_way)` is told of every triangle that is reached, from which one, and whether both run along
-    /// their common edge in the same direction, which neighbours that face the same way don't.
+    /// `visit(from, to, same_way)` gets every triangle that is reached, its predecessor, and whether both use their
+    /// common edge in the same direction. Neighbours with the same orientation don't.
     async fn patches(
         &self,
         joins: impl Fn(&[EdgeUse]) -> bool,
@@ -258,7 +258,7 @@ impl MeshTopology {
         Patches { of_triangle, count: count as usize }
     }
 
-    /// Where each triangle's sides are found among the sorted edges.
+    /// Positions of each triangle's sides in the sorted edges.
     async fn sides(&self, pace: &Pace) -> Vec<[(u32, u32); 3]> {
         let mut sides = vec![[(0u32, 0u32); 3]; self.triangles.len()];
         let mut filled = vec![0u8; self.triangles.len()];
@@ -281,7 +281,7 @@ impl MeshTopology {
 
 /// Parts of a surface.
 pub(crate) struct Patches {
-    /// The part of every triangle, `None` where it is degenerate.
+    /// The part of every triangle, `None` if it is degenerate.
     pub of_triangle: Vec<Option<u32>>,
     /// Number of parts.
     pub count: usize,

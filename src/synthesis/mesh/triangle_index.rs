@@ -1,4 +1,4 @@
-//! Questions to single triangles, and the index over those of a mesh.
+//! Queries of single triangles, and an index over the triangles of a mesh.
 
 use crate::synthesis::mesh::TriangleMesh;
 use crate::synthesis::pace::{Pace, at_once};
@@ -8,17 +8,17 @@ use bevy_math::{DVec3, Vec3};
 /// A point on a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Where it is.
+    /// Its position.
     pub position: Vec3,
     /// Number of the triangle in the mesh.
     pub triangle: usize,
     /// Weights of the triangle's three corners; they sum to 1.
     pub barycentric: Vec3,
-    /// Squared distance from the point that was asked for; for a hit, from the start of the segment.
+    /// Squared distance from the query point; for a hit, from the start of the segment.
     pub distance_squared: f32,
 }
 
-/// Index over the triangles of a mesh that have an area.
+/// Index over the triangles of a mesh that are not degenerate.
 #[derive(Clone, Debug, Default)]
 pub struct TriangleIndex {
     tree: BoxTree,
@@ -34,7 +34,7 @@ impl TriangleIndex {
         at_once(Self::new_paced(mesh, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub async fn new_paced(mesh: &TriangleMesh, pace: &Pace) -> Self {
         let mut numbers: Vec<u32> = Vec::with_capacity(mesh.triangles().len());
         let take = |number: usize| {
@@ -52,9 +52,9 @@ impl TriangleIndex {
         Self { tree, corners, triangles }
     }
 
-    /// The point of the mesh nearest to `point`; `None` where that is not finite.
+    /// The point of the mesh nearest to `point`; `None` if that is not finite.
     ///
-    /// Of equally near triangles the first of the mesh counts.
+    /// Of equally near triangles, the first in the mesh is returned.
     pub fn closest(&self, point: Vec3) -> Option<SurfacePoint> {
         self.closest_within(point, f32::INFINITY)
     }
@@ -66,7 +66,7 @@ impl TriangleIndex {
             return None;
         }
         self.tree.nearest(point, radius * radius, |slot, best| {
-            // Most triangles of a leaf are farther off than the best one, and their boxes tell.
+            // Most triangles of a leaf are farther than the best, which their boxes show.
             if Bounds::around(&self.corners[slot]).distance_squared(point.into()) > best {
                 return best;
             }
@@ -101,7 +101,7 @@ impl TriangleIndex {
         found
     }
 
-    /// Where the segment between two points first meets the mesh, from either side.
+    /// The first point at which the segment between two points hits the mesh, from either side.
     pub fn first_hit(&self, from: Vec3, to: Vec3) -> Option<SurfacePoint> {
         let mut found: Option<SurfacePoint> = None;
         if !(from.is_finite() && to.is_finite()) {
@@ -134,9 +134,9 @@ impl TriangleIndex {
     }
 }
 
-/// The point of a triangle that corner weights stand for.
+/// The point of a triangle with given corner weights.
 fn at([a, b, c]: [Vec3; 3], weights: DVec3) -> DVec3 {
-    // As an offset from one corner, so that the rounding is that of the triangle's size.
+    // As an offset from one corner, so that rounding is relative to the triangle's size.
     a.as_dvec3() + (b.as_dvec3() - a.as_dvec3()) * weights.y + (c.as_dvec3() - a.as_dvec3()) * weights.z
 }
 
@@ -182,8 +182,8 @@ fn closest_weights(point: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
     DVec3::new(1.0 - v - w, v, w)
 }
 
-/// Where a segment meets a triangle: share of the way, 0 to 1, and corner weights. `None` too where it runs within the
-/// triangle's plane.
+/// The point at which a segment hits a triangle: share of the way, 0 to 1, and corner weights. Also `None` if the
+/// segment lies in the triangle's plane.
 ///
 /// Möller & Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997), in f64.
 fn hit_triangle(from: Vec3, to: Vec3, corners: [Vec3; 3]) -> Option<(f32, DVec3)> {

@@ -1,11 +1,11 @@
 //! Triangle meshes of organs: checked once, then safe for every stage.
 //!
-//! In come positions, triangles and, where there are any, texture coordinates, as a file or an engine's mesh holds them:
-//! vertices may be duplicated along seams, triangles may be degenerate. [`TriangleMesh::new`] refuses only what no stage
-//! could use and says why. Out come measures ([area](TriangleMesh::area), [volume](TriangleMesh::signed_volume),
-//! [bounds](TriangleMesh::bounds)), smooth [normals](TriangleMesh::vertex_normals) and the [`topology`](super::topology).
+//! In: positions, triangles and optional texture coordinates, as in a file or an engine's mesh: vertices may be
+//! duplicated along seams, triangles may be degenerate. [`TriangleMesh::new`] refuses only meshes that no stage can
+//! use, and says why. Out: measures ([area](TriangleMesh::area), [volume](TriangleMesh::signed_volume),
+//! [bounds](TriangleMesh::bounds)), smooth [normals](TriangleMesh::vertex_normals) and the
+//! [`topology`](super::topology).
 
-use super::Welding;
 use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::{
     DVec3, Vec2, Vec3,
@@ -17,7 +17,7 @@ pub const MAX_COORDINATE: f32 = 1.0e9;
 
 /// Whether all coordinates are finite and within [`MAX_COORDINATE`].
 pub(crate) fn is_usable(position: Vec3) -> bool {
-    // The greatest of NaN and a number may be the number, so both are asked.
+    // The maximum of NaN and a number may be the number, so both are tested.
     position.is_finite() && position.abs().max_element() <= MAX_COORDINATE
 }
 
@@ -41,9 +41,9 @@ pub enum MeshError {
     /// More vertices or triangles than [`MAX_TRIANGLES`].
     #[error("the mesh has {count} {what}, more than {MAX_TRIANGLES}; decimate it first")]
     TooLarge {
-        /// What there is too much of.
+        /// What exceeds the limit.
         what: &'static str,
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
     /// A vertex with a NaN or infinite coordinate, or one beyond [`MAX_COORDINATE`].
@@ -53,7 +53,7 @@ pub enum MeshError {
     BadPosition {
         /// The first such vertex.
         vertex: usize,
-        /// Where it is.
+        /// Its position.
         position: Vec3,
     },
     /// A triangle with a vertex that does not exist.
@@ -86,7 +86,7 @@ pub enum MeshError {
     },
 }
 
-/// An indexed triangle mesh that has passed [`new`](Self::new).
+/// An indexed triangle mesh, checked by [`new`](Self::new).
 ///
 /// It has at least one triangle with an area, every index is in range and every coordinate finite. Triangles are
 /// counter-clockwise seen from outside where the mesh has an outside.
@@ -104,7 +104,7 @@ impl TriangleMesh {
     /// source; see [`welded`](Self::welded) for a copy without them.
     ///
     /// # Errors
-    /// The first thing that no later stage could work with: see [`MeshError`].
+    /// The first error that makes the mesh unusable: see [`MeshError`].
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, uvs: Option<Vec<Vec2>>) -> Result<Self, MeshError> {
         at_once(Self::new_paced(positions, triangles, uvs, &Pace::default()))
     }
@@ -169,7 +169,7 @@ impl TriangleMesh {
     /// The corners of a triangle.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|index| self.positions[index as usize])
     }
@@ -196,15 +196,15 @@ impl TriangleMesh {
     /// Area of a triangle, in square tissue lengths.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     pub fn triangle_area(&self, triangle: usize) -> f64 {
         0.5 * doubled_normal(self.corners(triangle)).length()
     }
 
-    /// Whether a triangle has no area to speak of: its corners coincide or lie on a line.
+    /// Whether a triangle has no significant area: its corners coincide or lie on a line.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     pub fn is_degenerate(&self, triangle: usize) -> bool {
         is_degenerate(self.corners(triangle))
     }
@@ -216,8 +216,7 @@ impl TriangleMesh {
 
     /// Volume enclosed by the triangles, by the divergence theorem, in cubic tissue lengths.
     ///
-    /// Negative where triangles face inwards. Meaningless for an open mesh; where shells overlap, the overlap counts
-    /// once for each.
+    /// Negative if triangles face inwards. Meaningless for an open mesh. An overlap of shells counts once for each.
     pub fn signed_volume(&self) -> f64 {
         at_once(self.signed_volume_paced(&Pace::default()))
     }
@@ -230,42 +229,15 @@ impl TriangleMesh {
         pace.part(0.4..1.0).sum(self.triangles.len(), volume).await
     }
 
-    /// Unit normal of a triangle, `Vec3::ZERO` where it is degenerate.
+    /// Unit normal of a triangle, `Vec3::ZERO` if it is degenerate.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// If there is no such triangle.
     pub fn triangle_normal(&self, triangle: usize) -> Vec3 {
         unit(doubled_normal(self.corners(triangle)))
     }
 
-    /// Unit normal of every vertex: the mean over its triangles, weighted by their area.
-    ///
-    /// Vertices at the same position share one normal, so that texture seams don't show. `Vec3::ZERO` for a vertex
-    /// without triangles, or whose triangles cancel out.
-    pub fn vertex_normals(&self) -> Vec<Vec3> {
-        self.vertex_normals_with(&self.weld())
-    }
-
-    /// [`vertex_normals`](Self::vertex_normals) with a welding at hand.
-    pub fn vertex_normals_with(&self, welding: &Welding) -> Vec<Vec3> {
-        at_once(self.vertex_normals_paced(welding, &Pace::default()))
-    }
-
-    /// The same, with rests.
-    pub(crate) async fn vertex_normals_paced(&self, welding: &Welding, pace: &Pace) -> Vec<Vec3> {
-        let mut sums = vec![DVec3::ZERO; welding.count()];
-        let add = |triangle: usize| {
-            let normal = doubled_normal(self.corners(triangle));
-            for &corner in &self.triangles[triangle] {
-                sums[welding.vertex(corner)] += normal;
-            }
-        };
-        pace.part(0.0..0.6).each(self.triangles.len(), add).await;
-        let normals: Vec<Vec3> = pace.part(0.6..0.9).collect(sums.len(), |welded| unit(sums[welded])).await;
-        pace.part(0.9..1.0).collect(self.positions.len(), |vertex| normals[welding.vertex(vertex as u32)]).await
-    }
-
-    /// The same mesh with the triangles reversed for which `flip` says so; it is asked for each triangle's number.
+    /// The same mesh with those triangles reversed for whose number `flip` returns true.
     #[must_use]
     pub fn with_flipped(self, flip: impl Fn(usize) -> bool) -> Self {
         at_once(self.with_flipped_paced(flip, &Pace::default()))
@@ -288,7 +260,7 @@ impl TriangleMesh {
 pub(crate) fn is_degenerate(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    // NaN and a longest edge of 0 fail it too.
+    // NaN and a longest edge of 0 fail it, too.
     let has_area = (b - a).cross(c - a).length() > DEGENERATE_SHAPE * longest;
     !has_area
 }
@@ -299,13 +271,13 @@ pub(crate) fn doubled_normal(corners: [Vec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Signed volume of the tetrahedron between a triangle and `origin`, positive where the triangle faces away from it.
+/// Signed volume of the tetrahedron between a triangle and `origin`, positive if the triangle faces away from it.
 pub(crate) fn tetrahedron_volume(corners: [Vec3; 3], origin: Vec3) -> f64 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - origin.as_dvec3());
     a.dot(b.cross(c)) / 6.0
 }
 
-/// A vector at length 1, or zero.
+/// A vector scaled to length 1, or zero.
 pub(crate) fn unit(vector: DVec3) -> Vec3 {
     vector.try_normalize().map_or(Vec3::ZERO, |unit| unit.as_vec3())
 }

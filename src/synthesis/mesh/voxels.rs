@@ -1,12 +1,12 @@
-//! A voxel grid over a mesh: which voxels its surface touches, and which voxel centres it encloses.
+//! A voxel grid over a mesh: the voxels that its surface touches, and the voxel centres that it encloses.
 //!
-//! A closed mesh encloses every point a whole number of times, which a single ray tells: each triangle that it crosses
-//! counts up or down, whatever shells the mesh consists of. Where a mesh is open, rays disagree. Then six vote, along the
-//! axes both ways, and four must find a point enclosed: a sample of the generalised winding number (Jacobson, Kavan &
+//! In a closed mesh, every point has an integer winding number, which a single ray gives: each triangle that it crosses
+//! counts up or down, for any shells of the mesh. In an open mesh, rays disagree. Then six rays vote, along the axes in
+//! both directions, and four must find a point enclosed: a sample of the generalised winding number (Jacobson, Kavan &
 //! Sorkine-Hornung, "Robust Inside-Outside Segmentation using Generalized Winding Numbers", 2013).
 
 use crate::synthesis::{
-    mesh::TriangleMesh,
+    mesh::{TriangleMesh, crossing::crossing},
     pace::{Pace, STRETCH, Stretch},
 };
 use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
@@ -26,7 +26,7 @@ pub enum VoxelError {
         /// All voxels.
         voxels: f64,
     },
-    /// Large triangles in numbers that fill space instead of surrounding it.
+    /// Too many large triangles, which fill space instead of surrounding it.
     #[error("the triangles touch the voxels in more than {limit} places; lower the resolution, or repair the mesh")]
     TooManyTouches {
         /// The largest number of places.
@@ -34,26 +34,26 @@ pub enum VoxelError {
     },
 }
 
-/// Where the grid begins, in voxels before the mesh's box. Odd fractions, different along each axis, so that no voxel
-/// centre lies in a face of a mesh whose sides are whole numbers of voxels.
+/// Margin of the grid before the mesh's box, in voxels. The fractions differ along each axis, so that no voxel centre
+/// lies in a face of a mesh whose sides are whole numbers of voxels.
 const PADDING: DVec3 = DVec3::new(0.31, 0.37, 0.43);
-/// What a triangle's surroundings are widened by against rounding, in voxels.
+/// Margin around a triangle for rounding, in voxels.
 const SLACK: f64 = 1.0e-6;
-/// Of six rays, how many must find a point enclosed.
+/// Number of rays, of six, that must find a point enclosed.
 pub(crate) const MAJORITY: u8 = 4;
-/// What it costs to begin a layer of a triangle, in voxels.
+/// Cost of beginning a layer of a triangle, in voxels.
 const LAYER: usize = 4;
 /// Most pairs of a triangle and a voxel that it touches.
 const MAX_TOUCHES: usize = 1 << 25;
 
-/// What the rays from a point say.
+/// The result of the rays from a point.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Finding {
-    /// How often the first ray finds the point enclosed.
+    /// Winding number of the point by the first ray.
     pub winding: i16,
-    /// How many of six rays find it enclosed.
+    /// Number of rays, of six, that find it enclosed.
     votes: u8,
-    /// How many of six rays find the same as the first.
+    /// Number of rays, of six, that agree with the first.
     agreeing: u8,
 }
 
@@ -63,7 +63,7 @@ impl Finding {
         self.votes >= MAJORITY
     }
 
-    /// Whether there is no doubt about the winding number.
+    /// Whether the winding number is certain.
     pub fn is_unanimous(self) -> bool {
         self.agreeing == 6
     }
@@ -88,7 +88,7 @@ impl Grid {
         }
         let (min, max) = (Vec3::from(bounds.min).as_dvec3(), Vec3::from(bounds.max).as_dvec3());
         let cell = (max - min).max_element() / f64::from(resolution);
-        // So many that the last centre along each axis lies behind the mesh.
+        // Enough that the last centre along each axis lies behind the mesh.
         let size = ((max - min) / cell + PADDING + 0.5).floor() + 1.0;
         let voxels = size.element_product();
         if voxels > Self::MAX_VOXELS as f64 {
@@ -107,12 +107,12 @@ impl Grid {
         self.cell
     }
 
-    /// A point in voxels from the grid's corner.
+    /// Position of a point in voxels from the grid's corner.
     pub fn local(&self, point: Vec3) -> DVec3 {
         (point.as_dvec3() - self.origin) / self.cell
     }
 
-    /// The point that lies `local` voxels from the grid's corner.
+    /// The point at `local` voxels from the grid's corner.
     pub fn global(&self, local: DVec3) -> Vec3 {
         (self.origin + local * self.cell).as_vec3()
     }
@@ -159,7 +159,7 @@ impl Grid {
         Ok(pairs)
     }
 
-    /// Which voxels a triangle may touch.
+    /// The voxels that a triangle may touch.
     fn reach(&self, corners: [Vec3; 3]) -> Reach {
         let corners = corners.map(|corner| self.local(corner));
         let (min, max) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
@@ -181,7 +181,7 @@ impl Grid {
         }
     }
 
-    /// What rays from the centre of every voxel say: for a closed mesh one each, for an open one six.
+    /// Findings at the centre of every voxel: by one ray each for a closed mesh, by six for an open one.
     pub async fn findings(&self, mesh: &TriangleMesh, closed: bool, pace: &Pace) -> Vec<Finding> {
         let mut findings = pace.part(0.0..0.1).collect(self.len(), |_| Finding::default()).await;
         let axes = if closed { 1 } else { 3 };
@@ -210,8 +210,8 @@ impl Grid {
         findings
     }
 
-    /// Where the columns of voxel centres along an axis cross the mesh: at the first voxel behind each crossing the
-    /// change of the winding number.
+    /// Crossings of the mesh with the columns of voxel centres along an axis: the change of the winding number, at the
+    /// first voxel behind each crossing.
     async fn steps(&self, mesh: &TriangleMesh, axis: usize, pace: &Pace) -> Vec<i16> {
         let mut steps = vec![0i16; self.len()];
         let mut stretch = Stretch::default();
@@ -225,14 +225,14 @@ impl Grid {
         steps
     }
 
-    /// Adds the crossings of one triangle. Returns how many columns were tried.
+    /// Adds the crossings of one triangle. Returns the number of columns tested.
     fn cross_columns(&self, corners: [Vec3; 3], axis: usize, steps: &mut [i16]) -> usize {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let local = corners.map(|corner| self.local(corner) - 0.5);
         let flat = local.map(|corner| DVec2::new(corner[u], corner[v]));
         let (min, max) = (flat[0].min(flat[1]).min(flat[2]), flat[0].max(flat[1]).max(flat[2]));
         let range = |min: f64, max: f64, size: usize| {
-            // Empty where the triangle lies between two centres.
+            // Empty if the triangle lies between two centres.
             min.ceil().max(0.0) as usize..((max.floor() + 1.0).max(0.0) as usize).min(size)
         };
         let (columns_u, columns_v) = (range(min.x, max.x, self.size[u]), range(min.y, max.y, self.size[v]));
@@ -243,7 +243,7 @@ impl Grid {
                 let behind = height.ceil().max(0.0) as usize;
                 let mut voxel = [0; 3];
                 (voxel[u], voxel[v], voxel[axis]) = (column_u, column_v, behind.min(self.size[axis] - 1));
-                // The grid reaches on behind the mesh; by rounding it might just not.
+                // The grid extends behind the mesh, but rounding might prevent this.
                 if behind < self.size[axis] {
                     let step = &mut steps[self.number(voxel)];
                     *step = step.saturating_sub(facing);
@@ -253,12 +253,12 @@ impl Grid {
         columns_u.len() * columns_v.len()
     }
 
-    /// Visits every voxel with the windings that its centre sees along an axis, downwards and upwards.
+    /// Visits every voxel with the winding numbers of its centre along an axis, downwards and upwards.
     async fn walk_columns(&self, axis: usize, steps: &[i16], mut visit: impl FnMut(usize, i16, i16), pace: &Pace) {
-        // Voxels side by side across the axis are `inner` apart along it.
+        // Neighbours along the axis are `inner` apart in the list.
         let inner: usize = self.size[..axis].iter().product();
         let slab = inner * self.size[axis];
-        // Rows from one rest to the next.
+        // Rows between two rests.
         let some = inner * (STRETCH / inner).max(1);
         let mut stretch = Stretch::default();
         let mut total = vec![0i16; inner];
@@ -294,50 +294,10 @@ impl Grid {
     }
 }
 
-/// Where the line through `point`, upright on the plane of `flat`, crosses a triangle: whether the triangle faces up (1)
-/// or down (−1) there, and the height.
-///
-/// A line through an edge or a vertex counts as moved aside by an infinitesimal amount, the same for all triangles, so
-/// that a closed surface is crossed once in each place.
-pub(crate) fn crossing(point: DVec2, flat: [DVec2; 3], heights: [f64; 3]) -> Option<(i16, f64)> {
-    let [a, b, c] = flat;
-    // Twice the areas of the triangles between the point and the edges opposite a, b and c.
-    let (areas_a, areas_b, areas_c) = (side(b, c, point), side(c, a, point), side(a, b, point));
-    let facing = areas_a.1;
-    if areas_b.1 != facing || areas_c.1 != facing {
-        return None;
-    }
-    let area = areas_a.0 + areas_b.0 + areas_c.0;
-    if area == 0.0 {
-        return None;
-    }
-    let height = (areas_a.0 * heights[0] + areas_b.0 * heights[1] + areas_c.0 * heights[2]) / area;
-    Some((facing, height))
-}
-
-/// Twice the signed area between a directed edge and a point, and the side of the edge on which the point is: 1 for left.
-fn side(from: DVec2, to: DVec2, point: DVec2) -> (f64, i16) {
-    // Always computed for the same direction of an edge, so that both of its triangles see the same rounding.
-    let ordered = (from.x, from.y) < (to.x, to.y);
-    let (low, high) = if ordered { (from, to) } else { (to, from) };
-    let edge = high - low;
-    let area = edge.perp_dot(point - low);
-    // On the edge, the point counts as moved by (ε, ε²).
-    let left = if area != 0.0 {
-        area > 0.0
-    } else if edge.y != 0.0 {
-        edge.y < 0.0
-    } else {
-        edge.x > 0.0
-    };
-    let sign = if left == ordered { 1 } else { -1 };
-    (if ordered { area } else { -area }, sign)
-}
-
 /// The voxels around a triangle.
 struct Reach {
     spans: [RangeInclusive<usize>; 3],
-    /// What tells voxels apart from the triangle; nothing where there is one voxel.
+    /// Tests that separate voxels from the triangle; empty for a single voxel.
     slabs: Vec<Slab>,
 }
 
@@ -348,7 +308,7 @@ impl Reach {
     }
 }
 
-/// A direction in which a triangle and a voxel can be told apart: the triangle's extent, widened by that of a voxel.
+/// A direction that can separate a triangle from a voxel, with the triangle's extent widened by that of a voxel.
 struct Slab {
     axis: DVec3,
     min: f64,
@@ -362,8 +322,8 @@ impl Slab {
     }
 }
 
-/// All directions in which a triangle and a unit cube can be apart, but for the axes (Akenine-Möller, "Fast 3D
-/// Triangle-Box Overlap Testing", 2001): the normal, and those across an edge and an axis.
+/// All separating directions of a triangle and a unit cube except the axes (Akenine-Möller, "Fast 3D Triangle-Box
+/// Overlap Testing", 2001): the normal, and those perpendicular to an edge and an axis.
 fn slabs(corners: [DVec3; 3]) -> Vec<Slab> {
     let edges = [corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]];
     let across = edges.into_iter().flat_map(|edge| DVec3::AXES.map(|axis| axis.cross(edge)));
@@ -375,28 +335,4 @@ fn slabs(corners: [DVec3; 3]) -> Vec<Slab> {
             Slab { axis, min: a.min(b).min(c) - reach, max: a.max(b).max(c) + reach }
         })
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::synthesis::mesh::voxels::*;
-
-    #[test]
-    fn lines_through_edges_and_vertices_cross_once() {
-        // A fan around the origin: each line must cross exactly one of its triangles.
-        let around: Vec<DVec2> = [(2.0, 0.0), (2.0, 1.0), (0.0, 2.0), (-1.0, 0.0), (-1.0, -1.0), (0.0, -3.0)]
-            .into_iter()
-            .map(DVec2::from)
-            .collect();
-        for point in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (-0.5, -0.5), (0.0, -1.5), (0.1, 0.2), (1.0, 0.5)] {
-            let crossed = (0..around.len())
-                .filter_map(|i| {
-                    let fan = [DVec2::ZERO, around[i], around[(i + 1) % around.len()]];
-                    crossing(point.into(), fan, [1.0; 3])
-                })
-                .collect::<Vec<_>>();
-            assert_eq!(crossed.len(), 1, "at {point:?}");
-            assert_eq!(crossed[0].0, 1);
-        }
-    }
 }

@@ -1,10 +1,10 @@
-//! Which vertices of a mesh are at the same position, and the mesh with each position once.
+//! Finds vertices of a mesh at the same position, and makes a mesh with each position once.
 
 use super::TriangleMesh;
 use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::Vec3;
 
-/// Which vertices of a mesh are at the same position.
+/// The vertices of a mesh that are at the same position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Welding {
     vertices: Vec<u32>,
@@ -15,7 +15,7 @@ impl Welding {
     /// The welded vertex that a vertex of the mesh belongs to. Welded vertices are numbered in order of appearance.
     ///
     /// # Panics
-    /// When the mesh has no such vertex.
+    /// If the mesh has no such vertex.
     pub fn vertex(&self, vertex: u32) -> usize {
         self.vertices[vertex as usize] as usize
     }
@@ -26,7 +26,7 @@ impl Welding {
     }
 }
 
-/// What stands in the welding table where no vertex is.
+/// An empty entry of the welding table.
 const EMPTY: u32 = u32::MAX;
 
 impl TriangleMesh {
@@ -35,7 +35,7 @@ impl TriangleMesh {
         at_once(self.weld_paced(&Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn weld_paced(&self, pace: &Pace) -> Welding {
         let positions = self.positions();
         // Open addressing over at least twice as many slots as vertices: a probe nearly always ends at once.
@@ -71,7 +71,7 @@ impl TriangleMesh {
         at_once(self.welded_paced(&Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn welded_paced(&self, pace: &Pace) -> Self {
         let welding = self.weld_paced(&pace.part(0.0..0.3)).await;
         let mut positions = vec![Vec3::ZERO; welding.count()];
@@ -89,7 +89,7 @@ impl TriangleMesh {
     }
 }
 
-/// Drops triangles whose three vertices an earlier triangle has too, in whichever order.
+/// Drops triangles with the same three vertices as an earlier one, in any order.
 async fn without_repeats(triangles: Vec<[u32; 3]>, pace: &Pace) -> Vec<[u32; 3]> {
     let key = |number: usize| {
         let mut sorted = triangles[number];

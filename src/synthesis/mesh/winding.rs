@@ -1,19 +1,19 @@
-//! Making the triangles of a mesh face the way that winding numbers need.
+//! Orients the triangles of a mesh as winding numbers need it.
 
 use crate::synthesis::{
-    mesh::{TriangleIndex, TriangleMesh, tetrahedron_volume, topology::Patches, voxels::crossing},
+    mesh::{TriangleIndex, TriangleMesh, crossing::crossing, tetrahedron_volume, topology::Patches},
     pace::Pace,
     space::bvh::Bounds,
 };
 use bevy_math::{DVec2, Vec3};
 
-/// Points of a shell that must all be enclosed for it to count as a cavity.
+/// Points of a shell, all of which must be enclosed for it to count as a cavity.
 const PROBES: usize = 9;
 
-/// Turns triangles that face the other way than those around them, and closed shells that face the other way than the
+/// Flips triangles that are oriented against those around them, and closed shells that are oriented against the
 /// largest, unless they are cavities in it. `index` is that of the mesh.
 ///
-/// Also tells of which triangles the neighbours are missing or out of order: of none if the result is closed.
+/// Also returns which triangles have missing or inconsistent neighbours: none if the result is closed.
 pub(crate) async fn oriented(mesh: TriangleMesh, index: &TriangleIndex, pace: &Pace) -> (TriangleMesh, Vec<bool>) {
     let topology = mesh.topology_paced(&pace.part(0.0..0.5)).await;
     let misoriented = topology.misoriented_paced(&mesh, &pace.part(0.5..0.7)).await;
@@ -65,7 +65,7 @@ async fn shell_volumes(mesh: &TriangleMesh, patches: &Patches, pace: &Pace) -> V
     volumes
 }
 
-/// Whether the triangles that `counts` lets through wind around a point, seen along z.
+/// Whether the triangles that `counts` accepts wind around a point, seen along z.
 fn is_enclosed(point: Vec3, mesh: &TriangleMesh, index: &TriangleIndex, counts: impl Fn(usize) -> bool) -> bool {
     let region = Bounds { min: point.into(), max: point.with_z(f32::INFINITY).into() };
     let mut winding = 0;

@@ -1,7 +1,7 @@
-//! The centre line of a tubular organ: a spline kept off itself, with frames that do not twist.
+//! The centre line of a tubular organ: a spline that avoids itself, with frames that do not twist.
 //!
-//! In: control points with what varies along the tube. Out: a [`CentreLine`] sampled at equal arc length, whose tube does
-//! not cut itself: bends are rounder than the tube is thick and neighbouring limbs stay apart. Frames are
+//! In: control points with values that vary along the tube. Out: a [`CentreLine`] sampled at equal arc length, whose
+//! tube does not intersect itself: bends are wide enough for the tube and neighbouring limbs stay apart. Frames are
 //! rotation-minimising, by double reflection (Wang, Jüttler, Zheng & Liu 2008), turned toward a given side of the tube.
 
 use bevy_math::{Vec3, ops};
@@ -13,7 +13,7 @@ pub struct Control {
     pub position: Vec3,
     /// Radius of the tube, in metres.
     pub radius: f32,
-    /// Anything else that varies smoothly along the tube: for the colon, how deep its haustra are.
+    /// Another value that varies smoothly along the tube: for the colon, the depth of its haustra.
     pub weight: f32,
 }
 
@@ -24,7 +24,7 @@ pub struct Frame {
     pub centre: Vec3,
     /// Unit tangent, toward the end of the line.
     pub tangent: Vec3,
-    /// Unit vector across the tube, from which angles around it are counted.
+    /// Unit vector across the tube, at which the angle is 0.
     pub side: Vec3,
     /// Tangent × side.
     pub up: Vec3,
@@ -49,18 +49,18 @@ pub struct CentreLine {
 }
 
 impl CentreLine {
-    /// Samples a spline control point, before it is resampled by arc length.
+    /// Samples per spline control point, before resampling by arc length.
     const SAMPLES_PER_CONTROL: usize = 8;
-    /// Rounds of keeping limbs apart and bends round; shapes made with room to spare take fewer.
+    /// Most rounds of separating limbs and rounding bends; shapes with enough room take fewer.
     const RELAXATIONS: usize = 80;
     /// Share of the radius of curvature that the tube may fill, so that its inner side keeps some length at a bend.
     const BEND_FILL: f32 = 0.8;
 
-    /// Runs a uniform cubic B-spline along `controls` and makes room for the tube.
+    /// Builds a uniform cubic B-spline from `controls` and makes room for the tube.
     ///
     /// `clearance` multiplies the radius to give the room that the wall's bulges need; `spacing` is the arc length between
-    /// samples, in metres; `toward` is the point that the frames' sides face, as far as a gentle twist allows. Limbs are
-    /// pushed apart and bends rounded first; where that was not enough the radius is lowered. Fewer than two control
+    /// samples, in metres; `toward` is the point that the frames' sides face, as far as a gentle twist allows. Limbs
+    /// are pushed apart and bends rounded first; if that is not enough, the radius is lowered. Fewer than two control
     /// points give a line without length.
     pub fn new(controls: &[Control], clearance: f32, spacing: f32, toward: Vec3) -> Self {
         let mut line = spline(controls, Self::SAMPLES_PER_CONTROL);
@@ -161,7 +161,7 @@ fn spline_point(quad: &[Control], t: f32) -> Control {
     point
 }
 
-/// Pushes limbs of the tube apart where they touch and smooths the line where it bends too sharply, until neither happens.
+/// Pushes touching limbs of the tube apart and smooths bends that are too sharp, until there are none.
 fn relax(line: &mut [Control], clearance: f32, rounds: usize) {
     let mut arcs = Vec::new();
     let mut moves = vec![Vec3::ZERO; line.len()];
@@ -181,13 +181,13 @@ fn relax(line: &mut [Control], clearance: f32, rounds: usize) {
     }
 }
 
-/// Adds half of what each pair of limbs overlaps to their moves.
+/// Adds half of the overlap of each pair of limbs to their moves.
 fn part_limbs(line: &[Control], arcs: &[f32], clearance: f32, moves: &mut [Vec3]) -> bool {
     let mut touched = false;
     for i in 0..line.len() {
         for j in i + 1..line.len() {
             let room = clearance * (line[i].radius + line[j].radius);
-            // Closer along the tube, two cross-sections are neighbours in a bend: that is round_bends' matter.
+            // Cross-sections closer along the tube are neighbours in a bend, which `round_bends` handles.
             if arcs[j] - arcs[i] < 1.7 * room {
                 continue;
             }
@@ -204,7 +204,7 @@ fn part_limbs(line: &[Control], arcs: &[f32], clearance: f32, moves: &mut [Vec3]
     touched
 }
 
-/// Adds a step of smoothing to the moves wherever the tube is too thick for its bend.
+/// Adds a step of smoothing to the moves where the tube is too thick for its bend.
 fn round_bends(line: &[Control], clearance: f32, moves: &mut [Vec3]) -> bool {
     let mut bent = false;
     for i in 2..line.len().saturating_sub(2) {
@@ -245,7 +245,7 @@ fn arc_lengths(line: &[Control]) -> impl Iterator<Item = f32> + '_ {
     })
 }
 
-/// Points at equal arc length, the last interval rounded away.
+/// Points at equal arc length. A last interval shorter than the spacing is dropped.
 fn resample(line: &[Control], spacing: f32) -> Vec<Control> {
     let arcs: Vec<f32> = arc_lengths(line).collect();
     let length = arcs.last().copied().unwrap_or(0.0);

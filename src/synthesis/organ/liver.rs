@@ -1,9 +1,9 @@
-//! The liver: a procedural lobed wedge, another for every seed.
+//! The liver: a procedural lobed wedge, different for every seed.
 //!
-//! Smoothly blended ellipsoids make the right and the left lobe, the caudate and the quadrate lobe; smooth cuts make the
-//! hollows that the kidney, the stomach and the gall bladder leave on the underside, the porta hepatis and the notch of
-//! the falciform ligament. The surface is where that field is zero along the rays from a point within, found by
-//! sphere tracing, on an icosphere whose vertices are then evened out; so it is closed and star-shaped by construction.
+//! Smoothly blended ellipsoids make the right, left, caudate and quadrate lobes; smooth cuts make the hollows of the
+//! kidney, the stomach and the gall bladder on the underside, the porta hepatis and the notch of the falciform
+//! ligament. The surface is the zero of that field along rays from an inner point, found by sphere tracing, on an
+//! icosphere whose vertices are then evened out. So it is closed and star-shaped by construction.
 //!
 //! UVs are the rays' longitude and latitude: good for mottling, not for baking (they meet at two poles and wrap once).
 
@@ -16,13 +16,13 @@ use bevy_math::{Quat, Vec2, Vec3, ops};
 use rand::{Rng, RngExt};
 use std::collections::BTreeMap;
 
-/// What a liver looks like. The same settings give the same mesh, bit for bit.
+/// Settings of a liver. The same settings give the same mesh, bit for bit.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct LiverSettings {
-    /// Which liver: lobes, hollows, surface and colours vary with it.
+    /// Chooses a liver: lobes, hollows, surface and colours vary with it.
     ///
     /// Default: 0.
     pub seed: u64,
@@ -34,7 +34,7 @@ pub struct LiverSettings {
     ///
     /// Limits: 0 to 1.5. Default: [`Self::DEFAULT_VARIATION`].
     pub variation: f32,
-    /// How often the icosahedron's triangles are divided in four: the mesh has 20·4ⁿ triangles.
+    /// Number of times that the icosahedron's triangles are divided in four: the mesh has 20·4ⁿ triangles.
     ///
     /// Limits: 2 to 8. Default: [`Self::DEFAULT_SUBDIVISIONS`].
     pub subdivisions: u32,
@@ -43,9 +43,9 @@ pub struct LiverSettings {
 impl LiverSettings {
     /// Within the 20 to 26 cm of an adult's liver.
     pub const DEFAULT_WIDTH: f32 = 0.24;
-    /// As far as livers of adults differ without being remarkable.
+    /// The normal variation among adults' livers.
     pub const DEFAULT_VARIATION: f32 = 1.0;
-    /// 81,920 triangles would be 6; 20,480 look round.
+    /// 20,480 triangles, which look round; 6 would give 81,920.
     pub const DEFAULT_SUBDIVISIONS: u32 = 5;
 
     /// Makes the liver.
@@ -104,13 +104,13 @@ pub struct Liver {
 
 /// Width of the shapes below, in metres.
 const MODEL_WIDTH: f32 = 0.24;
-/// Point within, from which the whole surface is seen.
+/// An inner point that sees the whole surface.
 const MIDDLE: Vec3 = Vec3::new(-0.015, 0.008, 0.0);
 /// The porta hepatis, on the underside, and the vena cava's groove at the back, as directions from [`MIDDLE`].
 const PORTA: Vec3 = Vec3::new(0.1, -0.8, -0.45);
 const VENA_CAVA: Vec3 = Vec3::new(0.25, 0.55, -0.8);
 
-/// An ellipsoid that is added to the liver, or cut from it.
+/// An ellipsoid that is added to the liver or cut from it.
 struct Blob {
     centre: Vec3,
     radii: Vec3,
@@ -120,7 +120,7 @@ struct Blob {
 }
 
 impl Blob {
-    /// About the distance to the ellipsoid's surface, in metres; negative within.
+    /// Approximate distance to the ellipsoid's surface, in metres; negative inside.
     fn distance(&self, point: Vec3) -> f32 {
         let local = self.turn * (point - self.centre);
         let scaled = (local / self.radii).length();
@@ -129,7 +129,7 @@ impl Blob {
     }
 }
 
-/// Lobes first, then what is cut away: centre, radii, turn about z (degrees), blend.
+/// Lobes first, then cuts: centre, radii, turn about z (degrees), blend.
 const SHAPES: [([f32; 3], [f32; 3], f32, f32); 11] = [
     ([-0.052, 0.008, -0.006], [0.068, 0.072, 0.058], 0.0, 0.0), // right lobe
     ([-0.070, -0.036, 0.006], [0.046, 0.058, 0.042], 0.0, 0.03), // its lower part
@@ -150,7 +150,7 @@ struct Field {
 }
 
 impl Field {
-    /// Most steps along a ray, and how near the surface it ends, in metres.
+    /// Most steps along a ray, and the distance to the surface at which it ends, in metres.
     const TRACE_STEPS: usize = 48;
     const TRACE_TOLERANCE: f32 = 2e-5;
 
@@ -172,7 +172,7 @@ impl Field {
         Self { shapes, relief: Noise::new(rng.next_u32()) }
     }
 
-    /// Negative within the liver, about the distance to its surface in metres.
+    /// Approximate distance to the liver's surface in metres, negative inside.
     fn at(&self, point: Vec3) -> f32 {
         let mut field = f32::INFINITY;
         for shape in &self.shapes {
@@ -186,7 +186,7 @@ impl Field {
         field
     }
 
-    /// The surface along a unit direction from the middle, found by sphere tracing from within.
+    /// The surface along a unit direction from the middle, found by sphere tracing from inside.
     fn surface(&self, direction: Vec3) -> Vec3 {
         let mut reach = 0.01;
         for _ in 0..Self::TRACE_STEPS {
@@ -206,7 +206,7 @@ fn turn_about_z(degrees: f32) -> Quat {
     Quat::from_xyzw(0.0, 0.0, ops::sin(half), ops::cos(half))
 }
 
-/// The smaller of two, rounded over where they are within `blend` of each other.
+/// Smooth minimum of two numbers, blended if they are within `blend` of each other.
 fn smooth_min(a: f32, b: f32, blend: f32) -> f32 {
     let near = (blend - (a - b).abs()).max(0.0) / blend.max(f32::MIN_POSITIVE);
     a.min(b) - 0.25 * near * near * blend
@@ -259,7 +259,7 @@ fn chart(direction: Vec3) -> Vec2 {
     Vec2::new(longitude, ops::acos(direction.y.clamp(-1.0, 1.0)) / PI)
 }
 
-/// Moves the rays so that the triangles on the surface become more equal: a few rounds of Laplacian smoothing there.
+/// Moves the rays so that the triangles on the surface become more equal, by a few rounds of Laplacian smoothing.
 fn even_out(directions: &mut [Vec3], triangles: &[[u32; 3]], surface: &impl Fn(Vec3) -> Vec3) {
     const ROUNDS: usize = 4;
     let mut sums = vec![(Vec3::ZERO, 0.0f32); directions.len()];

@@ -1,9 +1,9 @@
-//! Procedural organ meshes with variation: an organ of any seed, without a file.
+//! Procedural organ meshes with variation: an organ for any seed, without a file.
 //!
-//! Every generator takes settings with a seed and returns a value: a closed, outward-oriented [`ShadedMesh`](super::mesh::ShadedMesh) in metres with
-//! normals, UVs and vertex colours, and what a scene needs beside it (where vessels enter, where to look from). The
-//! anatomy is schematic: shapes and proportions that read as the organ at first sight, with dimensions in the human range.
-//! It is neither measured from a person nor meant for diagnosis.
+//! Every generator takes settings with a seed and returns a value: a closed, outward-oriented
+//! [`ShadedMesh`](super::mesh::ShadedMesh) in metres with normals, UVs and vertex colours, and data for a scene (where
+//! vessels enter, viewpoints). The anatomy is schematic: shapes and proportions are recognisable at first sight, with
+//! dimensions in the human range. It is neither measured from a person nor meant for diagnosis.
 //!
 //! - [`colon`]: the large intestine with haustra, taeniae coli and a lumen that is open at the rectal end.
 //! - [`liver`]: a lobed wedge.
@@ -18,7 +18,7 @@ pub use liver::{Liver, LiverSettings};
 
 use bevy_math::Vec3;
 
-/// Where vessels enter an organ: points on its surface, for [`RootPlacement::Nearest`].
+/// The points on an organ's surface where vessels enter, for [`RootPlacement::Nearest`].
 ///
 /// [`RootPlacement::Nearest`]: crate::synthesis::roots::RootPlacement::Nearest
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,28 +29,28 @@ pub struct RootSites {
     pub venous: Vec<Vec3>,
 }
 
-/// A place to look from.
+/// A viewpoint for a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// Where the camera is, in metres.
+    /// Position of the camera, in metres.
     pub eye: Vec3,
-    /// What it looks at, in metres.
+    /// Point that it looks at, in metres.
     pub target: Vec3,
-    /// Which way is up in the picture.
+    /// Direction that is up in the picture.
     pub up: Vec3,
 }
 
-/// A setting that an organ cannot be made with.
+/// A setting with which an organ cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{organ} {name} is {value}; it must be {limits}")]
 pub struct OrganSettingsError {
-    /// The organ whose setting it is.
+    /// The organ of the setting.
     pub organ: &'static str,
     /// Name of the field.
     pub name: &'static str,
     /// The value found.
     pub value: f32,
-    /// What it may be.
+    /// Its limits.
     pub limits: &'static str,
 }
 

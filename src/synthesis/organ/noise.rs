@@ -1,15 +1,15 @@
-//! Smooth value noise in space: the same number for the same place and seed, everywhere.
+//! Smooth value noise in space: the same number for the same point and seed on every platform.
 
 use bevy_math::{IVec3, Vec3};
 
-/// Noise with a seed of its own.
+/// Noise with a seed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Noise {
     seed: u32,
 }
 
 impl Noise {
-    /// Noise that differs from that of every other seed.
+    /// Noise that is different for every seed.
     pub fn new(seed: u32) -> Self {
         Self { seed }
     }

@@ -5,7 +5,7 @@ use crate::synthesis::pace::{Pace, Stretch, at_once};
 
 /// A table over a list of weights.
 ///
-/// To draw: choose a slot evenly, then let [`pick`](Self::pick) stay with it or take the other one it holds.
+/// To draw, choose a slot uniformly. [`pick`](Self::pick) then stays with it or takes the slot's alternative.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AliasTable {
     picks: Vec<Pick>,
@@ -16,14 +16,14 @@ pub(crate) struct AliasTable {
 
 #[derive(Clone, Copy, Debug)]
 struct Pick {
-    /// Probability of staying with this slot.
+    /// Probability of keeping this slot.
     keep: f32,
     /// The slot to take otherwise.
     other: u32,
 }
 
 impl AliasTable {
-    /// The table of so many weights, which are not below 0, with rests. It is empty where none is above 0.
+    /// The table of `count` weights, which are not below 0, with rests. It is empty if none is above 0.
     pub async fn new_paced(count: usize, weight: impl Fn(usize) -> f64, pace: &Pace) -> Self {
         let mut table = Self::default();
         table.rebuild_paced(count, weight, pace).await;
@@ -31,7 +31,7 @@ impl AliasTable {
         table
     }
 
-    /// Takes other weights, keeping memory.
+    /// Rebuilds the table for other weights, keeping its memory.
     pub fn rebuild(&mut self, count: usize, weight: impl Fn(usize) -> f64) {
         at_once(self.rebuild_paced(count, weight, &Pace::default()));
     }
@@ -52,14 +52,14 @@ impl AliasTable {
         let mut heaviest = 0;
         let sort = |slot: usize| {
             if shares[slot] < 1.0 {
-                small.push(slot as u32)
+                small.push(slot as u32);
             } else {
-                large.push(slot as u32)
+                large.push(slot as u32);
             }
             heaviest = if shares[slot] > shares[heaviest] { slot } else { heaviest };
         };
         pace.part(0.4..0.5).each(count, sort).await;
-        // Until it turns out otherwise a slot is its own, and one without weight is the heaviest one's.
+        // Initially a slot keeps itself, and a slot without weight gives the heaviest one.
         let keep = |share: f64| f32::from(u8::from(share > 0.0));
         let fill = |slot: usize| picks.push(Pick { keep: keep(shares[slot]), other: heaviest as u32 });
         pace.part(0.5..0.7).each(count, fill).await;
@@ -84,7 +84,7 @@ impl AliasTable {
         self.picks.len()
     }
 
-    /// What a slot gives, by an even number from 0 to below 1.
+    /// The result for a slot and a uniform number from 0 to below 1.
     #[inline]
     pub fn pick(&self, slot: u32, even: f32) -> u32 {
         let pick = self.picks[slot as usize];

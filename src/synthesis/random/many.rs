@@ -1,13 +1,13 @@
-//! Many random points at once: the generator is asked for long runs of words, which costs a fraction of asking for each.
+//! Many random points at once: long runs of words from the generator cost a fraction of single words.
 
 use crate::synthesis::random::VesselRng;
 use bevy_math::Vec3;
 use rand::Rng;
 
-/// Words taken from the generator at once. What is left of the last run is dropped.
+/// Words taken from the generator at once. The rest of the last run is dropped.
 const RUN: usize = 192;
 
-/// Appends `count` points, each made from `N` random words. Words from which `point` makes none are replaced by others.
+/// Appends `count` points, each made from `N` random words. Words for which `point` returns `None` are drawn again.
 pub(crate) fn draw<const N: usize>(
     rng: &mut VesselRng,
     count: u32,
@@ -32,7 +32,7 @@ pub(crate) fn draw<const N: usize>(
     }
 }
 
-/// Calls `each` for `count` lots of `N` random words.
+/// Calls `each` for `count` groups of `N` random words.
 pub(crate) fn each<const N: usize>(rng: &mut VesselRng, count: u32, mut each: impl FnMut([u32; N])) {
     let mut words = [0u32; RUN];
     let mut left = count as usize;
@@ -44,7 +44,7 @@ pub(crate) fn each<const N: usize>(rng: &mut VesselRng, count: u32, mut each: im
     }
 }
 
-/// How many of `count` even numbers lie below `share`: a binomial variate, to within 2⁻³² of its probability.
+/// How many of `count` uniform numbers lie below `share`: a binomial variate, to within 2⁻³² of its probability.
 pub(crate) fn count_below(rng: &mut VesselRng, count: u32, share: f64) -> u32 {
     let limit = (share * f64::from(u32::MAX)) as u32;
     let mut below = 0;
@@ -64,8 +64,8 @@ pub(crate) fn unit(word: u32) -> f32 {
     (word >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
 }
 
-/// A number from 0 to below `count`, by the high half of a product: no two results get shares of the 2³² words that differ
-/// by more than one.
+/// A number from 0 to below `count`, by the high half of a product: the numbers of words that give each result differ
+/// by at most one.
 #[inline]
 pub(crate) fn below(word: u32, count: u32) -> u32 {
     ((u64::from(word) * u64::from(count)) >> 32) as u32

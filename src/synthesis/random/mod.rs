@@ -1,4 +1,4 @@
-//! Randomness that is the same on every platform: streams from one seed, many numbers at once, and choice by weight.
+//! Randomness that is the same on every platform: streams from one seed, many numbers at once, and weighted choice.
 
 pub(crate) mod alias_table;
 pub(crate) mod many;

@@ -1,7 +1,7 @@
 //! Random streams: one `u64` seed for an organ, one named stream per stage.
 //!
-//! Every stage draws from a ChaCha8 stream of its own, so that adding a draw to one stage leaves the others as they
-//! were. ChaCha8 is specified to the bit, hence the same on every platform and in every future version.
+//! Every stage draws from its own ChaCha8 stream, so a new draw in one stage doesn't change the others. ChaCha8 is
+//! specified to the bit, hence the same on every platform and in every future version.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,9 +1,9 @@
-//! What can be wrong with roots.
+//! Errors of roots.
 
 use crate::synthesis::{mesh::MAX_COORDINATE, tree::VesselKind};
 use bevy_math::Vec3;
 
-/// Why roots cannot be put where they were asked for.
+/// The reason why roots cannot be placed as requested.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RootError {
     /// A coordinate that is NaN, infinite or beyond [`MAX_COORDINATE`].
@@ -11,7 +11,7 @@ pub enum RootError {
     NotFinite {
         /// The kind whose root it is.
         kind: VesselKind,
-        /// The position asked for.
+        /// The requested position.
         position: Vec3,
     },
     /// A root out of reach of the tissue.
@@ -22,7 +22,7 @@ pub enum RootError {
     TooFar {
         /// The kind whose root it is.
         kind: VesselKind,
-        /// The position asked for.
+        /// The requested position.
         position: Vec3,
         /// Its distance from the tissue.
         distance: f32,
@@ -48,7 +48,7 @@ pub enum RootError {
     TooMany {
         /// The kind in question.
         kind: VesselKind,
-        /// The number asked for.
+        /// The requested number.
         count: u32,
         /// The largest number.
         limit: u32,
@@ -59,12 +59,12 @@ pub enum RootError {
         kind.name()
     )]
     Forbidden {
-        /// The system whose root it is.
+        /// The kind of the root.
         kind: VesselKind,
-        /// Where it would be.
+        /// Its requested position.
         position: Vec3,
     },
-    /// A tissue that gave fewer places than roots are to be spread.
+    /// A tissue with too few places for the roots to be spread.
     #[error(
         "the tissue has room for {found} of {wanted} {} roots; ask for fewer, or leave more of it free of no-go regions",
         kind.name()
@@ -72,12 +72,12 @@ pub enum RootError {
     NoRoom {
         /// The kind in question.
         kind: VesselKind,
-        /// The number asked for.
+        /// The requested number.
         wanted: u32,
         /// The number of places found.
         found: u32,
     },
-    /// A distance for roots to reach that is below [`Roots::LEAST_REACH`](super::Roots::LEAST_REACH), or not a number.
+    /// A reach of roots that is below [`Roots::LEAST_REACH`](super::Roots::LEAST_REACH), or NaN.
     #[error("{} roots are to reach {reach} equivalent diameters; it must be finite and at least {least}", kind.name())]
     Reach {
         /// The kind in question.
@@ -87,8 +87,8 @@ pub enum RootError {
         /// The least value.
         least: f32,
     },
-    /// Arteries and veins each put their roots beside the other.
-    #[error("arterial and venous roots are both to be put beside the other's; place one of them otherwise")]
+    /// Arteries and veins are each placed beside the other.
+    #[error("arterial and venous roots are each placed beside the other's; place one of them otherwise")]
     BesideEachOther,
     /// A given tree with such a coordinate.
     #[error("node {node} of the given {} tree is at {position}, which is not finite and within ±{MAX_COORDINATE}", kind.name())]

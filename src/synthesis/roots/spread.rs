@@ -1,4 +1,4 @@
-//! Roots that the seed chooses: far from each other, or beside those of another kind.
+//! Roots chosen by the seed: far from each other, or beside those of another kind.
 
 use super::{RootError, Roots};
 use crate::synthesis::{
@@ -9,16 +9,16 @@ use crate::synthesis::{
 use bevy_math::Vec3;
 use rand::RngExt;
 
-/// Samples of the tissue among which roots are chosen, at least.
+/// Least number of tissue samples among which roots are chosen.
 pub(super) const SPREAD_SAMPLES: u32 = 1024;
-/// Samples per spread root, at least.
+/// Least number of samples per spread root.
 const SAMPLES_PER_ROOT: u32 = 16;
-/// Draws per sample before a tissue counts as having no more.
+/// Draws per sample after which a tissue counts as exhausted.
 const DRAWS_PER_SAMPLE: u32 = 64;
 /// Directions tried for a root beside another.
 const DIRECTIONS: u32 = 16;
 
-/// Roots far from each other: of many samples, again and again the one furthest from those chosen (Gonzalez,
+/// Roots far from each other: of many samples, repeatedly chooses the one furthest from those chosen (Gonzalez,
 /// "Clustering to minimize the maximum intercluster distance", 1985).
 pub(super) fn spread(
     tissue: &dyn Tissue,
@@ -32,7 +32,7 @@ pub(super) fn spread(
     let samples = draw(tissue, SPREAD_SAMPLES.max(count * SAMPLES_PER_ROOT), rng);
     let mut distances = vec![f32::INFINITY; samples.len()];
     let mut chosen: Vec<TissuePoint> = Vec::with_capacity(count as usize);
-    // The first sample is as good as any; of equal distances the earliest counts.
+    // Begins with the first sample; of equal distances, the earliest is chosen.
     let mut next = 0;
     while chosen.len() < count as usize {
         if distances.get(next).is_none_or(|&distance| distance == 0.0) {
@@ -51,14 +51,15 @@ pub(super) fn spread(
     Ok(chosen)
 }
 
-/// Samples of the tissue, its [entrance](Tissue::entrance) first where it has one. Fewer than wanted where draws fail.
+/// Samples of the tissue, beginning with its [entrance](Tissue::entrance) if it has one. Fewer than wanted if draws
+/// fail.
 pub(super) fn draw(tissue: &dyn Tissue, wanted: u32, rng: &mut VesselRng) -> Vec<Vec3> {
     let draws = (0..wanted * DRAWS_PER_SAMPLE).filter_map(|_| tissue.sample(rng));
     tissue.entrance().into_iter().chain(draws).take(wanted as usize).collect()
 }
 
-/// A point of the tissue one step length from a root: of several directions the one whose point comes out best. Where no
-/// vessel may be is no place for it, unless there is no other.
+/// A point of the tissue one step length from a root, in the best of several directions. No-go regions are avoided if
+/// possible.
 pub(super) fn beside(tissue: &dyn Tissue, root: &TissuePoint, step: f32, rng: &mut VesselRng) -> TissuePoint {
     let forbidden = |point: Vec3| tissue.no_go().is_some_and(|no_go| no_go.forbids(point));
     let mut best: Option<(f32, TissuePoint)> = None;
@@ -73,7 +74,7 @@ pub(super) fn beside(tissue: &dyn Tissue, root: &TissuePoint, step: f32, rng: &m
         if best.is_none_or(|(least, _)| error < least) {
             best = Some((error, point));
         }
-        // Close enough to take, so that the direction is the seed's and not that of least rounding.
+        // Good enough: otherwise rounding, instead of the seed, would choose the direction.
         if error < 0.1 * step {
             break;
         }
@@ -81,13 +82,13 @@ pub(super) fn beside(tissue: &dyn Tissue, root: &TissuePoint, step: f32, rng: &m
     best.map_or(*root, |(_, point)| point)
 }
 
-/// A unit vector drawn evenly from the plane across `normal`, or from all directions where that is zero.
+/// A unit vector drawn uniformly from the plane perpendicular to `normal`, or from all directions if that is zero.
 fn tangent(normal: Vec3, rng: &mut VesselRng) -> Vec3 {
     let random = |rng: &mut VesselRng| 2.0 * rng.random::<f32>() - 1.0;
     for _ in 0..64 {
         let point = Vec3::new(random(rng), random(rng), random(rng));
-        // Within the unit ball, directions are even; too near its centre they are rounding. Their shadows on a plane
-        // through the centre are even too.
+        // Within the unit ball, directions are uniform, except for rounding too near its centre. Their projections to a
+        // plane through the centre are uniform, too.
         let flat = point - normal * point.dot(normal);
         if point.length_squared() <= 1.0 && flat.length_squared() > 1.0e-4 {
             return flat.normalize();

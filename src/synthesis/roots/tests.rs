@@ -1,9 +1,11 @@
 use super::*;
 use crate::synthesis::mesh::TriangleMesh;
-use crate::synthesis::tissue::{Ball, Cuboid, Disc, MeshSurface, Rectangle, TissueError};
-use bevy_math::Vec2;
+use crate::synthesis::random::Stream;
+use crate::synthesis::tissue::{Ball, Cuboid, Disc, MeshSurface, Rectangle, Tissue, TissueError, TissuePoint};
+use crate::synthesis::tree::{ByKind, VesselTree};
+use bevy_math::{Vec2, Vec3};
 
-/// Arteries and veins as space colonization grows them on a disc of diameter 1.
+/// The spacing of arteries and veins of space colonization on a disc of diameter 1.
 const SPACING: ByKind<Option<RootSpacing>> = ByKind {
     artery: Some(RootSpacing { step: 0.03, reach: 0.065 }),
     vein: Some(RootSpacing { step: 0.03, reach: 0.065 * 2.5 }),
@@ -11,7 +13,7 @@ const SPACING: ByKind<Option<RootSpacing>> = ByKind {
     duct: None,
 };
 
-/// Arteries so placed, and veins beside them.
+/// Arteries with this placement, and veins beside them.
 fn placed_arteries(artery: RootPlacement) -> Roots {
     RootPlacements { artery, ..RootPlacements::default() }.into()
 }
@@ -106,7 +108,7 @@ fn given_trees_must_be_within_reach() -> Result<(), TissueError> {
     Ok(())
 }
 
-/// Shares of tissue further from all roots than a way, as the crow flies.
+/// Number of samples whose straight distance from all roots exceeds a length.
 fn missed(tissue: &dyn Tissue, roots: &[TissuePoint], way: f32) -> usize {
     let mut rng = Stream::Statistics.rng(1);
     let samples = (0..2000).filter_map(|_| tissue.sample(&mut rng));
@@ -129,8 +131,8 @@ fn compact_tissues_have_one_root_and_long_ones_several_within_reach() -> Result<
         assert!((tissue.extent().equivalent_diameter() - size).abs() < 1e-3);
         for seed in 0..20 {
             let ByKind { artery: arteries, vein: veins, .. } = Roots::default().resolve(&*tissue, &SPACING, seed)?;
-            // At the least one for two ways of 1.8. At the most as many as fit in with 0.6 of a way between them, which
-            // from sample to sample goes in zigzag, by a fifth longer.
+            // At least one for two ways of 1.8. At most as many as fit with 0.6 of a way between them, which zigzags
+            // between samples and is a fifth longer.
             let most = 1 + (8.0 * 1.2 / (0.6 * way)) as usize;
             assert!((3..=most).contains(&arteries.len()), "seed {seed}: {} roots of {most}", arteries.len());
             assert_eq!(arteries.len(), veins.len());

@@ -1,9 +1,9 @@
-//! Roots as many as a tissue needs: one in a compact organ, several in a long one.
+//! As many roots as a tissue needs: one in a compact organ, several in a long one.
 //!
 //! In: a tissue and the distance along it that the vessels of one root reach. Out: roots that together reach all of it.
-//! Distances are measured over samples that are joined to their nearest ones, as by Tenenbaum, de Silva and Langford, "A
-//! Global Geometric Framework for Nonlinear Dimensionality Reduction" (2000), so that the two ends of a bent organ
-//! are far apart, and parts that nothing joins have roots of their own.
+//! Distances are measured over samples that are joined to their nearest neighbours, as by Tenenbaum, de Silva and
+//! Langford, "A Global Geometric Framework for Nonlinear Dimensionality Reduction" (2000), so that the two ends of a
+//! bent organ are far apart, and separate parts have their own roots.
 
 use super::{
     RootError,
@@ -18,27 +18,27 @@ use bevy_math::Vec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use std::{cmp::Reverse, collections::BinaryHeap, num::NonZeroUsize};
 
-/// Samples that each sample is joined to: enough to keep an evenly sampled tissue in one piece.
+/// Neighbours of each sample: enough to keep a uniformly sampled tissue connected.
 const LINKS: NonZeroUsize = NonZeroUsize::new(12).expect("12 is not zero");
-/// How far from the tissue a link may lead, as a share of its length: further than a surface bends away below it, less
+/// Largest distance of a link from the tissue, as a share of its length: more than a surface bends away below it, less
 /// than the gap between two folds.
 const GAP: f32 = 0.15;
-/// Points of a link that must be in the tissue, or as near.
+/// Points of a link that must be in the tissue, or this near to it.
 const BETWEEN: u32 = 5;
-/// Cosine of the angle between a normal and the other's opposite from which on two walls face each other.
+/// Cosine of the angle between one normal and the opposite of the other from which two walls face each other.
 const FACING: f32 = 0.5;
-/// Way from one of several roots, as a share of that from an only one: what needs several is narrow, and in a narrow tissue
-/// vessels come forward more slowly.
+/// Reach of one of several roots, as a share of that of a single one: a tissue that needs several is narrow, and
+/// vessels advance more slowly in a narrow tissue.
 const SHARE_OF_SEVERAL: f32 = 0.6;
-/// Samples that are tried as the only root, before there are several.
+/// Samples tried as the only root, before there are several.
 const TRIES: u32 = 8;
-/// One sample in so many may stay out of reach. They are the ends of nooks, and bits of tissue too small for a root.
+/// One sample in this many may stay out of reach, in corners and bits of tissue too small for a root.
 const SPARED: usize = 200;
 
-/// Roots such that all tissue is within `way` of one, along the tissue.
+/// Finds roots such that all tissue is within `way` of one, along the tissue.
 ///
-/// The seed's first sample is the root if it reaches everything, else the first that does. Where none does, the first
-/// stays, and again and again the sample furthest from all roots becomes another, until they are near enough.
+/// The seed's first sample is the root if it reaches everything, else the first sample that does. If none does, the
+/// first stays, and the sample furthest from all roots is added repeatedly, until all are near enough.
 pub(super) fn within(
     tissue: &dyn Tissue,
     kind: VesselKind,
@@ -49,7 +49,7 @@ pub(super) fn within(
     if samples.is_empty() {
         return Err(RootError::NoRoom { kind, wanted: 1, found: 0 });
     }
-    // A tissue that names its entrance has one root, there.
+    // A tissue with an entrance has one root, there.
     let place = |&position: &Vec3| TissuePoint { position, ..tissue.closest_point(position) };
     if tissue.entrance().is_some() {
         return Ok(vec![place(&samples[0])]);
@@ -58,9 +58,9 @@ pub(super) fn within(
     Ok(Web::over(tissue, &places).centers(way).into_iter().map(|center| places[center as usize]).collect())
 }
 
-/// Samples, joined to their nearest ones.
+/// Samples, joined to their nearest neighbours.
 struct Web {
-    /// Of every sample the others it is joined to, with the way there.
+    /// The neighbours of every sample, with their distances.
     links: Vec<Vec<(u32, f32)>>,
 }
 
@@ -70,7 +70,7 @@ impl Web {
         for (a, b) in nearest_pairs(samples) {
             let ends = [samples[a as usize], samples[b as usize]];
             if leads_through(tissue, ends) {
-                // A vessel keeps its direction for a while, so that bends of the surface hold it up.
+                // A vessel keeps its direction for a while, so bends of the surface slow it down.
                 let bend = ends[0].normal.distance(ends[1].normal);
                 let length = ends[0].position.distance(ends[1].position) * (1.0 + bend);
                 links[a as usize].push((b, length));
@@ -105,10 +105,10 @@ impl Web {
         chosen
     }
 
-    /// Lowers the distances from the nearest root to what they are with another root (Dijkstra 1959).
+    /// Lowers the distances from the nearest root after adding another root (Dijkstra 1959).
     fn approach(&self, root: u32, distances: &mut [f32]) {
         distances[root as usize] = 0.0;
-        // Distances are not negative, so their bits are in their order.
+        // Distances are not negative, so their bits have the same order.
         let mut waiting = BinaryHeap::from([Reverse((0.0f32.to_bits(), root))]);
         while let Some(Reverse((bits, sample))) = waiting.pop() {
             let distance = f32::from_bits(bits);
@@ -126,14 +126,14 @@ impl Web {
     }
 }
 
-/// Every sample with each of those nearest to it, a pair once, in the order of the indices.
+/// Pairs of each sample and its nearest neighbours, each pair once, in the order of the indices.
 fn nearest_pairs(samples: &[TissuePoint]) -> Vec<(u32, u32)> {
     let points: Vec<[f32; 3]> = samples.iter().map(|sample| sample.position.to_array()).collect();
-    // Fails only on more points than a u32 counts. Every sample would be a piece of its own.
+    // Fails only for more points than a u32 can count. Then every sample is a separate piece.
     let Ok(index) = ImmutableKdTree::<f32, 3>::new_from_slice(&points) else { return Vec::new() };
     let mut pairs = Vec::with_capacity(samples.len() * LINKS.get());
     for (sample, point) in points.iter().enumerate() {
-        // One more, since the nearest is the sample itself.
+        // One more, since the nearest one is the sample itself.
         let nearest = index.query(point).nearest_n::<SquaredEuclidean<f32>>(LINKS.saturating_add(1)).execute();
         let others = nearest.iter().map(|found| found.item).filter(|&other| other != sample as u32);
         pairs.extend(others.map(|other| (other.min(sample as u32), other.max(sample as u32))));
@@ -143,10 +143,10 @@ fn nearest_pairs(samples: &[TissuePoint]) -> Vec<(u32, u32)> {
     pairs
 }
 
-/// Whether the tissue goes on between two of its points, rather than leaving a gap that vessels would have to cross.
+/// Whether the tissue continues between two of its points, without a gap that vessels would have to cross.
 fn leads_through(tissue: &dyn Tissue, [from, to]: [TissuePoint; 2]) -> bool {
     let way = to.position - from.position;
-    // Two walls that face each other, such as those of two folds, may be nearer than samples are.
+    // Two facing walls, such as those of two folds, may be nearer than samples are.
     let opposite = from.normal.dot(to.normal) < -FACING;
     if opposite && from.normal.dot(way) > 0.0 && to.normal.dot(way) < 0.0 {
         return false;
@@ -158,7 +158,7 @@ fn leads_through(tissue: &dyn Tissue, [from, to]: [TissuePoint; 2]) -> bool {
     })
 }
 
-/// Of equally far ones the first.
+/// The furthest sample; of equally far ones, the first.
 fn furthest(distances: &[f32]) -> u32 {
     (1..distances.len()).fold(0, |best, index| if distances[index] > distances[best] { index } else { best }) as u32
 }

@@ -1,14 +1,14 @@
-//! An index over the segments of a tree: which of them a box may meet, which is nearest, which a ray meets first.
+//! An index over the segments of a tree: those that a box may meet, the nearest, and the first that a ray hits.
 //!
-//! In: a [`VesselTree`], as it is, longer ([`extend`](SegmentIndex::extend)) or moved ([`refit`](SegmentIndex::refit)).
+//! In: a [`VesselTree`], which may grow ([`extend`](SegmentIndex::extend)) or move ([`refit`](SegmentIndex::refit)).
 //! Out: end nodes of segments, or a [`Place`] on one.
 //!
-//! Nodes lie in the order of their birth, and what is born together is spread over the whole organ. So the index is a
-//! row of runs, each the packed boxes of consecutive nodes, sorted along a space-filling curve. New nodes make a run. A
-//! run less than twice as long as the next is merged with that: at once while both are short, otherwise a few steps in
-//! each call, in proportion to the new nodes (Overmars & van Leeuwen, "Worst-case optimal insertion and deletion methods
-//! for decomposable searching problems", Inf. Process. Lett. 12, 1981). So there are never many runs, and no call takes
-//! long.
+//! Nodes are in the order of their birth, and nodes born together are spread over the whole organ. So the index is a
+//! list of runs, each the packed boxes of consecutive nodes, sorted along a space-filling curve. New nodes make a run.
+//! A run less than twice as long as the next is merged with it: at once if both are short, otherwise by a few steps in
+//! each call, in proportion to the new nodes (Overmars & van Leeuwen, "Worst-case optimal insertion and deletion
+//! methods for decomposable searching problems", Inf. Process. Lett. 12, 1981). So there are always few runs, and no
+//! call takes long.
 
 use crate::synthesis::segment_index::{
     RayCast, Region,
@@ -25,24 +25,24 @@ use bevy_math::Vec3;
 
 /// An index over the segments of one tree.
 ///
-/// A segment is known by its end node. Its box holds it with its radius, wherever the drawing may taper it from (see
-/// [`MAX_FLARE`](super::MAX_FLARE)). Boxes are those of the last [`extend`](Self::extend) or
-/// refit; questions that take the tree measure it as it is.
+/// A segment is identified by its end node. Its box holds it with the largest radius that it may be drawn with (see
+/// [`MAX_FLARE`](super::MAX_FLARE)). Boxes are those of the last [`extend`](Self::extend) or refit; queries that take
+/// the tree measure it as it is.
 ///
 /// Memory: 44 bytes a segment, twice that while it is merged, counted by [`bytes`](Self::bytes).
 #[derive(Clone, Debug, Default)]
 pub struct SegmentIndex {
     runs: Vec<Run>,
-    /// That all runs are sorted along.
+    /// All runs are sorted along it.
     curve: Curve,
 }
 
 impl SegmentIndex {
-    /// Most nodes that are sorted anew in one call, beside the new ones: some 2 ms.
+    /// Most nodes sorted again in one call, besides the new ones: some 2 ms.
     const AT_ONCE: usize = 8192;
     /// Steps of a merge for each new node. More than two, so that merges end before as many nodes wait for the next.
     const PACE: usize = 4;
-    /// New nodes that a call counts at least.
+    /// Least number of new nodes that a call counts.
     const LEAST_SHARE: usize = 256;
 
     /// Indexes all segments of a tree.
@@ -50,7 +50,7 @@ impl SegmentIndex {
         at_once(Self::new_paced(tree, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub async fn new_paced(tree: &VesselTree, pace: &Pace) -> Self {
         let mut index = Self::default();
         if !tree.is_empty() {
@@ -61,7 +61,7 @@ impl SegmentIndex {
         index
     }
 
-    /// Number of nodes that are indexed, roots included.
+    /// Number of indexed nodes, roots included.
     pub fn len(&self) -> usize {
         self.runs.last().map_or(0, |run| run.nodes.end as usize)
     }
@@ -76,11 +76,11 @@ impl SegmentIndex {
         self.runs.iter().map(Run::bytes).sum()
     }
 
-    /// Indexes the nodes that were appended to the tree since the last call.
+    /// Indexes the nodes appended to the tree since the last call.
     ///
-    /// Every call takes time in proportion to the new nodes, times the logarithm of all; one without new nodes goes on
-    /// with what earlier ones have left, for a fraction of a millisecond. A tree with fewer nodes than are indexed is
-    /// taken for another one, and indexed from the beginning.
+    /// Every call takes time in proportion to the new nodes, times the logarithm of all. A call without new nodes
+    /// continues the work that earlier ones left, for a fraction of a millisecond. A tree with fewer nodes than the
+    /// index counts as another tree, and is indexed from the beginning.
     pub fn extend(&mut self, tree: &VesselTree) {
         if tree.len() < self.len() {
             self.runs.clear();
@@ -93,7 +93,7 @@ impl SegmentIndex {
         self.merge(Self::PACE * new.max(Self::LEAST_SHARE));
     }
 
-    /// Makes a run of the new nodes, with those before that are quickly sorted anew.
+    /// Makes a run of the new nodes, together with earlier ones if they are few enough to be sorted again.
     fn append(&mut self, tree: &VesselTree, end: u32) {
         let mut start = self.len() as u32;
         let is_short = |run: &Run, start: u32| {
@@ -101,7 +101,7 @@ impl SegmentIndex {
         };
         while let Some(last) = self.runs.pop_if(|run| is_short(run, start)) {
             start = last.nodes.start;
-            // A merge with what has gone.
+            // Its merge was with a run that no longer exists.
             if let Some(run) = self.runs.last_mut() {
                 run.merge = None;
             }
@@ -112,7 +112,7 @@ impl SegmentIndex {
         self.runs.push(at_once(Run::new(tree, start..end, &self.curve, &Pace::default())));
     }
 
-    /// Begins merges where they are due, and goes on with each for some steps.
+    /// Begins merges that are due, and advances each by some steps.
     fn merge(&mut self, steps: usize) {
         for at in (1..self.runs.len()).rev() {
             let is_taken = self.runs.get(at.wrapping_sub(2)).is_some_and(|before| before.merge.is_some());
@@ -132,13 +132,13 @@ impl SegmentIndex {
         }
     }
 
-    /// Measures the boxes of all indexed segments anew, after nodes moved or radii changed.
+    /// Measures the boxes of all indexed segments again, after nodes moved or radii changed.
     ///
-    /// Questions stay as quick as they were while neighbours stay neighbours, as in tissue that bends and stretches.
-    /// After nodes were scattered, an index made [anew](Self::new) is quicker.
+    /// Queries stay as fast while neighbours stay neighbours, as in tissue that bends and stretches. After nodes were
+    /// scattered, a [new](Self::new) index is faster.
     ///
     /// # Panics
-    /// When the tree has fewer nodes than are indexed.
+    /// If the tree has fewer nodes than the index.
     pub fn refit(&mut self, tree: &VesselTree) {
         while self.runs.iter().any(|run| run.merge.is_some()) {
             self.merge(usize::MAX);
@@ -148,19 +148,19 @@ impl SegmentIndex {
         }
     }
 
-    /// Measures the boxes of some segments anew.
+    /// Measures the boxes of some segments again.
     ///
-    /// A node whose radius changed is to be named; of a node that moved, the node and its children. Roots and nodes that
-    /// are not indexed yet are skipped. Takes time in proportion to the nodes named.
+    /// Name each node whose radius changed, and each node that moved with its children. Roots and nodes that are not
+    /// indexed yet are skipped. Takes time in proportion to the nodes named.
     ///
     /// # Panics
-    /// When the tree has fewer nodes than are indexed.
+    /// If the tree has fewer nodes than the index.
     pub fn refit_nodes(&mut self, tree: &VesselTree, nodes: impl IntoIterator<Item = NodeId>) {
         for NodeId(node) in nodes {
             let at = self.runs.partition_point(|run| run.nodes.end <= node);
             let Some(run) = self.runs.get_mut(at) else { continue };
             run.refit_node(tree, node);
-            // It may have been taken into a merge, with the next run or with the one before.
+            // It may already be part of a merge, with the next run or with the one before.
             for pair in [Some(at), at.checked_sub(1)].into_iter().flatten() {
                 if let Some(merge) = &mut self.runs[pair].merge {
                     merge.refit_node(tree, node);
@@ -169,10 +169,10 @@ impl SegmentIndex {
         }
     }
 
-    /// Visits the end node of every segment whose box has a point in common with the box between two corners.
+    /// Visits the end node of every segment whose box shares a point with the box between two corners.
     ///
-    /// In no particular order, but always in the same. Nothing is visited where a corner holds NaN, or where `min`
-    /// exceeds `max`.
+    /// The order is unspecified, but always the same. Nothing is visited if a corner holds NaN, or if `min` exceeds
+    /// `max`.
     pub fn candidates(&self, min: Vec3, max: Vec3, mut visit: impl FnMut(NodeId)) {
         if min.cmple(max).all() {
             for run in &self.runs {
@@ -181,9 +181,9 @@ impl SegmentIndex {
         }
     }
 
-    /// Visits the end node of every segment whose box may have a point in common with a region, and perhaps others.
+    /// Visits the end node of every segment whose box may share a point with a region, and perhaps others.
     ///
-    /// In no particular order, but always in the same.
+    /// The order is unspecified, but always the same.
     pub fn candidates_in(&self, region: &Region, mut visit: impl FnMut(NodeId)) {
         let Some(slabs) = region.slabs() else { return self.candidates(region.min(), region.max(), visit) };
         for run in &self.runs {
@@ -197,21 +197,21 @@ impl SegmentIndex {
 
     /// Visits the end node of every segment whose box, and all boxes around that, pass a test.
     ///
-    /// `meets(min, max)` says whether a region may have a point in common with a box. For regions whose own box is
-    /// mostly empty, such as a plane that lies aslant.
+    /// `meets(min, max)` returns whether a region may share a point with a box. For regions whose own box is mostly
+    /// empty, such as an oblique plane.
     pub fn candidates_where(&self, meets: impl Fn(Vec3, Vec3) -> bool, mut visit: impl FnMut(NodeId)) {
         for run in &self.runs {
             run.boxes.walk(|pack| pack.passes(&meets), |slot| visit(NodeId(run.ends[slot])));
         }
     }
 
-    /// The place on any segment's centre line that is nearest to a point, and how far it is: at most `reach`.
+    /// The place on any segment's centre line that is nearest to a point, and its distance: at most `reach`.
     ///
-    /// Of equally near segments the one with the lower node counts. `None` where nothing is that near, and where the
-    /// point isn't finite or `reach` isn't a number.
+    /// Of equally near segments, the one with the lowest node is returned. `None` if nothing is that near, the point
+    /// isn't finite, or `reach` is NaN.
     ///
     /// # Panics
-    /// When the tree has fewer nodes than are indexed.
+    /// If the tree has fewer nodes than the index.
     pub fn nearest(&self, tree: &VesselTree, point: Vec3, reach: f32) -> Option<(Place, f32)> {
         if !(point.is_finite() && reach >= 0.0) {
             return None;
@@ -233,26 +233,26 @@ impl SegmentIndex {
         found.place.map(|place| (place, found.least.sqrt() as f32))
     }
 
-    /// The place that a ray meets first, and how far along the ray: at most `reach`.
+    /// The place that a ray hits first, and its distance along the ray: at most `reach`.
     ///
-    /// Segments are round cones, as they are drawn. The place is the centre of the ball that the ray meets. From inside
-    /// a segment the distance is 0; of segments met at the same distance the one with the lower node counts. `direction`
-    /// may have any length. `None` where nothing is met, and where `from` or `direction` isn't finite, `direction` is
-    /// zero or `reach` isn't a number.
+    /// Segments are round cones, as drawn. The place is the centre of the ball that the ray hits. From inside a segment
+    /// the distance is 0; of segments hit at the same distance, the one with the lowest node is returned. `direction`
+    /// may have any length. `None` if nothing is hit, `from` or `direction` isn't finite, `direction` is zero, or
+    /// `reach` is NaN.
     ///
     /// # Panics
-    /// When the tree has fewer nodes than are indexed.
+    /// If the tree has fewer nodes than the index.
     pub fn first_hit(&self, tree: &VesselTree, from: Vec3, direction: Vec3, reach: f32) -> Option<(Place, f32)> {
         let mut cast = RayCast::new(from, direction, reach)?;
         self.cast(tree, &mut cast, |_| [[0.0, 1.0]]);
         cast.found()
     }
 
-    /// Lets a ray meet the segments that lie in its way, the nearest boxes first: of each the `pieces` that are left of
-    /// it, as [`RayCast::meet`] takes them.
+    /// Casts a ray against the segments in its way, the nearest boxes first. `pieces` gives the remaining parts of
+    /// each, as for [`RayCast::meet`].
     ///
     /// # Panics
-    /// When the tree has fewer nodes than are indexed.
+    /// If the tree has fewer nodes than the index.
     pub fn cast<Pieces: IntoIterator<Item = [f32; 2]>>(
         &self,
         tree: &VesselTree,
@@ -285,7 +285,7 @@ mod tests {
         Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
     }
 
-    /// Segments anywhere, in the order of their nodes, and roots among them.
+    /// Segments anywhere, in the order of their nodes, with roots among them.
     fn scattered(nodes: usize, rng: &mut VesselRng) -> (Vec<Vec3>, Vec<u32>) {
         let (mut positions, mut parents) = (Vec::new(), Vec::new());
         for node in 0..nodes as u32 {
@@ -304,7 +304,7 @@ mod tests {
         found
     }
 
-    /// Runs are few, lie end to end, and are each in one merge at most.
+    /// Runs are few, consecutive, and each in one merge at most.
     fn check_runs(index: &SegmentIndex, what: &str) {
         let most = 2 * index.len().max(2).ilog2() as usize;
         assert!(index.runs.len() <= most, "{what}: {} runs of {} nodes", index.runs.len(), index.len());
@@ -368,7 +368,7 @@ mod tests {
             index.merge(SegmentIndex::PACE * (len - before).max(SegmentIndex::LEAST_SHARE));
             check_runs(&index, &format!("{len} nodes"));
         }
-        // What is left over ends without growth.
+        // Pending merges finish without growth.
         for _ in 0..nodes / SegmentIndex::LEAST_SHARE {
             index.extend(&tree);
         }

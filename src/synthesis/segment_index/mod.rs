@@ -1,6 +1,8 @@
-//! Which segments of a tree a box, a region or a ray meets, and which is nearest, while the tree grows and moves.
+//! Finds the segments of a tree that a box, a region or a ray meets, and the nearest one, while the tree grows and
+//! moves.
 //!
-//! In: a [`VesselTree`](crate::synthesis::tree::VesselTree). Out: a [`SegmentIndex`] that answers at any moment of a growth.
+//! In: a [`VesselTree`](crate::synthesis::tree::VesselTree). Out: a [`SegmentIndex`] that can be queried at any time of
+//! a growth.
 
 mod index;
 mod ray_cast;

@@ -1,15 +1,15 @@
-//! A segment's shape: the round cone that it is drawn as, and questions to it.
+//! A segment's shape: the round cone that it is drawn as, with its queries.
 //!
-//! A round cone is all the balls whose centre goes from one end of the segment to the other while their radius goes
-//! from the one end's to the other's. Everything here is in f64, on the tree's f32.
+//! A round cone is the union of all balls whose centre moves from one end of the segment to the other while their
+//! radius changes from one end's to the other's. Everything here is computed in f64, from the tree's f32.
 
 use crate::synthesis::tree::{NO_PARENT, VesselTree};
 use bevy_math::{DVec3, Vec3};
 
-/// How much wider than itself a segment may begin.
+/// Largest ratio of a segment's radius at its start to its own radius.
 ///
 /// A segment begins with its parent's radius, so that a vessel tapers without steps, but never with more than this
-/// multiple of its own: a thin side branch of a trunk would otherwise begin as a thorn as wide as the trunk. Both
+/// multiple of its own: otherwise a thin side branch of a trunk would begin as a thorn as wide as the trunk. Both
 /// daughters of a symmetric bifurcation are thinner than their parent by 2^(1/κ), 1.26 at κ = 3 and 1.31 at κ = 2.55,
 /// so they still flare nearly all the way.
 pub const MAX_FLARE: f32 = 1.3;
@@ -17,7 +17,7 @@ pub const MAX_FLARE: f32 = 1.3;
 /// The radius with which the segment of a node begins at its parent, in tissue lengths: 0 for a root.
 ///
 /// # Panics
-/// When the node is not of the tree.
+/// If the node is not in the tree.
 pub fn start_radius(tree: &VesselTree, node: usize) -> f32 {
     match tree.parents()[node] {
         NO_PARENT => 0.0,
@@ -28,7 +28,7 @@ pub fn start_radius(tree: &VesselTree, node: usize) -> f32 {
 /// The balls between two ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RoundCone {
-    /// Centre at the root's side.
+    /// Centre at the end towards the root.
     pub start: DVec3,
     /// Centre at the node.
     pub end: DVec3,
@@ -54,11 +54,11 @@ impl RoundCone {
         })
     }
 
-    /// Share of the way along the centre line at which it is nearest to a point, and the squared distance.
+    /// Share of the centre line at which it is nearest to a point, and the squared distance.
     pub fn nearest(&self, point: DVec3) -> (f64, f64) {
         let (along, to_point) = (self.end - self.start, point - self.start);
         let (share, length_squared) = (along.dot(to_point), along.length_squared());
-        // The ends are taken as they are, so that segments that share one are equally far.
+        // The ends are used exactly, so that segments that share one are equally far.
         if share <= 0.0 || length_squared == 0.0 {
             (0.0, to_point.length_squared())
         } else if share >= length_squared {
@@ -69,12 +69,12 @@ impl RoundCone {
         }
     }
 
-    /// How far along a ray of unit direction its first point in the cone is, 0 from inside, and the share of the way
-    /// along the centre line of the ball that is hit there.
+    /// Distance along a ray of unit direction to its first point in the cone, 0 from inside, and the share of the
+    /// centre line of the ball that is hit there.
     ///
-    /// A point q is inside where the least f(s) = |q − start − s·v|² − (r + s·k)² over 0 ≤ s ≤ 1 is at most 0, with v from
-    /// end to end and k the difference of radii. Between the ends the least is where f'(s) = 0, which leaves a quadratic
-    /// equation for the distance along the ray; at the ends it is a ball's.
+    /// A point q is inside if the least f(s) = |q − start − s·v|² − (r + s·k)² over 0 ≤ s ≤ 1 is at most 0, with v from
+    /// end to end and k the difference of radii. Between the ends the least is at f'(s) = 0, which gives a quadratic
+    /// equation for the distance along the ray; at the ends it is that of a ball.
     pub fn hit(&self, from: DVec3, direction: DVec3) -> Option<(f64, f64)> {
         let (v, k) = (self.end - self.start, self.end_radius - self.start_radius);
         let to_from = from - self.start;
@@ -102,9 +102,9 @@ impl RoundCone {
         side.chain(balls).filter(|(distance, _)| *distance >= 0.0).min_by(|x, y| x.0.total_cmp(&y.0))
     }
 
-    /// The same for a piece between two shares of the way: round where the segment ends, and flat where it was cut.
+    /// The same for a piece between two shares of the centre line: round at the segment's ends, and flat at cuts.
     ///
-    /// Both the cone and what lies between the cuts are convex, so the ray is in each from one distance to another.
+    /// Both the cone and the space between the cuts are convex, so the ray is in each from one distance to another.
     pub fn hit_piece(&self, from: DVec3, direction: DVec3, [first, last]: [f64; 2]) -> Option<(f64, f64)> {
         let v = self.end - self.start;
         let radius = |share: f64| self.start_radius + share * (self.end_radius - self.start_radius);
@@ -131,10 +131,10 @@ impl RoundCone {
         (enter <= leave).then(|| (enter, cut.unwrap_or_else(nearest)))
     }
 
-    /// From where to where a line of unit direction is in the cone; negative before its origin.
+    /// The interval in which a line of unit direction is in the cone; negative before its origin.
     ///
-    /// The cone is the hull of its two end balls: of the points in which the line meets these or the side, the first and
-    /// the last are those of the cone. See [`hit`](Self::hit).
+    /// The cone is the hull of its two end balls: of the points where the line meets these or the side, the first and
+    /// the last bound the interval. See [`hit`](Self::hit).
     fn passage(&self, from: DVec3, direction: DVec3) -> Option<[f64; 2]> {
         let (v, k) = (self.end - self.start, self.end_radius - self.start_radius);
         let to_from = from - self.start;
@@ -163,27 +163,27 @@ impl RoundCone {
     }
 }
 
-/// How far along a ray of unit direction a ball begins, 0 from inside.
+/// Distance along a ray of unit direction to a ball, 0 from inside.
 fn hit_ball(to_from: DVec3, direction: DVec3, radius: f64) -> Option<f64> {
     let c = to_from.length_squared() - radius * radius;
     if c <= 0.0 {
         return Some(0.0);
     }
     let b = to_from.dot(direction);
-    // From outside the first of the two roots is the nearer one, and positive where the ray comes closer.
+    // From outside, the first of the two roots is the nearer one, and positive if the ray comes closer.
     roots(1.0, b, c).into_iter().filter(|distance| *distance >= 0.0).min_by(f64::total_cmp)
 }
 
-/// The solutions of a·t² + 2·b·t + c = 0; NaN or infinite where there is none, or only one.
+/// The solutions of a·t² + 2·b·t + c = 0; NaN or infinite if there is none, or only one.
 fn roots(a: f64, b: f64, c: f64) -> [f64; 2] {
-    // The sum whose terms have one sign, so that none of the two solutions is a difference of nearly equal numbers.
+    // The terms of this sum have one sign, so that neither solution is a difference of nearly equal numbers.
     let sum = -(b + (b * b - a * c).sqrt().copysign(b));
     [sum / a, c / sum]
 }
 
 /// The box around a segment, as wide as any parent's radius can make it; `None` for a root.
 ///
-/// It depends on the node's own radius and on both ends' positions, so that a radius that changes touches one box.
+/// It depends on the node's own radius and on both ends' positions, so a changed radius affects only one box.
 pub(super) fn box_around(tree: &VesselTree, node: u32) -> Option<(Vec3, Vec3)> {
     let node = node as usize;
     let parent = tree.parents()[node];

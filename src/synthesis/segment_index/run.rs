@@ -1,7 +1,7 @@
-//! The segments of consecutive nodes, sorted along a curve, and how two such runs become one, a little at a time.
+//! The segments of consecutive nodes, sorted along a curve, and the incremental merge of two such runs.
 //!
-//! In: a [`VesselTree`], or two runs. Out: a [`Run`]. All runs of an index are sorted along one curve, so that two are
-//! merged by looking at each segment once, without a sort; and a merge can stop anywhere.
+//! In: a [`VesselTree`], or two runs. Out: a [`Run`]. All runs of an index are sorted along one curve, so a merge of
+//! two visits each segment once, without a sort, and can stop anywhere.
 
 use crate::synthesis::segment_index::round_cone::box_around;
 use crate::synthesis::{
@@ -21,10 +21,10 @@ pub(super) struct Run {
     pub boxes: PackedBoxes,
     /// Place of each slot on the curve, when it was sorted.
     keys: Vec<u64>,
-    /// Slot of each node and 1 more, 0 for a root, which has no segment. Memory that holds zeros is not touched before
-    /// it is written to.
+    /// Slot of each node plus 1, or 0 for a root, which has no segment. Zeroed memory is not touched before it is
+    /// written.
     slots: Vec<u32>,
-    /// How this run and the next become one.
+    /// The merge of this run and the next.
     pub merge: Option<Box<Merge>>,
 }
 
@@ -34,9 +34,9 @@ fn middle(tree: &VesselTree, node: u32) -> Option<Vec3> {
     (parent != NO_PARENT).then(|| tree.positions()[node as usize].midpoint(tree.positions()[parent as usize]))
 }
 
-/// A curve through the segments of a tree, with room around for those that grow later.
+/// A curve through the segments of a tree, with room for those that grow later.
 pub(super) async fn curve_through(tree: &VesselTree, pace: &Pace) -> Curve {
-    /// How much wider the curve's box is than that of the segments.
+    /// Ratio of the curve's box to that of the segments.
     const ROOM: f32 = 8.0;
     let mut corners: Option<[Vec3; 2]> = None;
     let enlarge = |node: usize| {
@@ -77,7 +77,7 @@ impl Run {
         self.slots[(node - self.nodes.start) as usize].checked_sub(1).map(|slot| slot as usize)
     }
 
-    /// Measures the box of one segment anew.
+    /// Measures the box of one segment again.
     pub fn refit_node(&mut self, tree: &VesselTree, node: u32) {
         if let Some(slot) = self.slot(node) {
             self.boxes.set(slot, box_of(tree, node));
@@ -106,24 +106,24 @@ impl Run {
     }
 }
 
-/// Two runs on their way to become one. They are whole until then, and answer.
+/// A merge of two runs under way. Until it ends, both stay complete and can be queried.
 #[derive(Clone, Debug)]
 pub(super) struct Merge {
     /// Slots taken from each of the two.
     taken: [usize; 2],
-    /// Packs that the packs above have taken in.
+    /// Packs that have been added to the packs above.
     raised: usize,
-    /// What has been merged.
+    /// The merged part.
     run: Run,
 }
 
 impl Merge {
-    /// Takes up to so many more steps: one for each segment and each pack. Returns the run once it is whole.
+    /// Does up to so many more steps: one for each segment and each pack. Returns the run once it is complete.
     pub fn advance(&mut self, runs: [&Run; 2], mut steps: usize) -> Option<Run> {
         let Self { taken, raised, run } = self;
         let [first, second] = runs;
         while steps > 0 && taken[0] + taken[1] < first.ends.len() + second.ends.len() {
-            // Of equal keys the lower node comes first, as in a run that is sorted at once.
+            // Of equal keys the lower node comes first, as in a run that is sorted as a whole.
             let takes_first = match (first.keys.get(taken[0]), second.keys.get(taken[1])) {
                 (Some(a), Some(b)) => a <= b,
                 (a, _) => a.is_some(),
@@ -144,7 +144,7 @@ impl Merge {
         (steps > 0).then(|| std::mem::take(run))
     }
 
-    /// Measures the box of one segment anew, if it has been taken.
+    /// Measures the box of one segment again, if it has been merged.
     pub fn refit_node(&mut self, tree: &VesselTree, node: u32) {
         self.run.refit_node(tree, node);
     }

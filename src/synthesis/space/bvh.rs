@@ -1,8 +1,8 @@
-//! A bounding volume hierarchy: the index behind every question of "what is near this point" or "along this line".
+//! A bounding volume hierarchy: the index for queries near a point or along a line.
 //!
-//! [`BoxTree`] knows only boxes; what is in them is the caller's. It is built once by binned surface-area splits (Wald,
-//! "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007) into one flat array in depth-first order, and
-//! asked without allocating.
+//! [`BoxTree`] knows only boxes; their contents belong to the caller. It is built once by binned surface-area splits
+//! (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007) into one flat array in depth-first
+//! order, and queried without allocating.
 
 use crate::synthesis::pace::{Pace, STRETCH, Stretch, at_once};
 use bevy_math::{BVec3A, Vec3, Vec3A};
@@ -12,11 +12,11 @@ use std::ops::Range;
 const BINS: usize = 16;
 /// Most boxes in a leaf.
 const LEAF: usize = 4;
-/// Depth from which on boxes are halved by number, so that depth stays below [`STACK`] whatever their shape.
+/// Depth from which boxes are halved by number, so that depth stays below [`STACK`] for any shape.
 const DEEP: u32 = 48;
-/// Room for the nodes still to be visited: [`DEEP`] levels and 2³² boxes halved by number.
+/// Size of the stack of pending nodes: [`DEEP`] levels and 2³² boxes halved by number.
 const STACK: usize = 96;
-/// Factor that takes a few roundings off the square of a length.
+/// Factor that lowers the square of a length by a few rounding errors.
 const SHORTENED: f32 = 1.0 - 4.0 * f32::EPSILON;
 
 /// An axis-aligned box, in the coordinates of the tissue.
@@ -29,7 +29,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// A box around nothing, which any point enlarges.
+    /// An empty box, which any point enlarges.
     pub const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
 
     /// The smallest box around some points.
@@ -51,21 +51,21 @@ impl Bounds {
         size.x * size.y + size.y * size.z + size.z * size.x
     }
 
-    /// Squared distance to a point, 0 inside; never above that of any point of the box, whatever the rounding.
+    /// Squared distance to a point, 0 inside; never above that of any point of the box, despite rounding.
     pub(crate) fn distance_squared(&self, point: Vec3A) -> f32 {
         let outside = (self.min - point).max(point - self.max).max(Vec3A::ZERO);
         outside.length_squared() * SHORTENED
     }
 
-    /// Whether two boxes have a point in common.
+    /// Whether two boxes share a point.
     fn overlaps(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && self.max.cmpge(other.min).all()
     }
 
-    /// Where a line enters the box, at or after 0, if it does so before `limit`. `inverse` is 1 / direction.
+    /// Parameter at which a line enters the box, at or after 0 and before `limit`. `inverse` is 1 / direction.
     fn entry(&self, from: Vec3A, inverse: Vec3A, limit: f32) -> Option<f32> {
         let (a, b) = ((self.min - from) * inverse, (self.max - from) * inverse);
-        // A line within a face gives 0 · ∞, not a number: count it as in.
+        // A line within a face gives 0 · ∞, NaN: count it as inside.
         let within: BVec3A = a.is_nan_mask() | b.is_nan_mask();
         let near = Vec3A::select(within, Vec3A::NEG_INFINITY, a.min(b));
         let far = Vec3A::select(within, Vec3A::INFINITY, a.max(b));
@@ -77,7 +77,7 @@ impl Bounds {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: Bounds,
-    /// Of a leaf: its first slot. Of an inner node: its second child; the first child follows the node.
+    /// For a leaf, its first slot. For an inner node, its second child; the first child follows the node.
     link: u32,
     /// Number of boxes in a leaf, 0 for an inner node.
     count: u32,
@@ -85,8 +85,8 @@ struct Node {
 
 /// The hierarchy over a list of boxes.
 ///
-/// A box is known by its slot, its place in [`order`](Self::order). Callers keep their own data in that order, so that
-/// what is asked for together lies together.
+/// A box is identified by its slot, its place in [`order`](Self::order). Callers keep their own data in that order, so
+/// that data used together lies together.
 #[derive(Clone, Debug, Default)]
 pub struct BoxTree {
     nodes: Vec<Node>,
@@ -98,7 +98,7 @@ pub struct BoxTree {
 struct Item {
     bounds: Bounds,
     id: u32,
-    /// Where it falls in the split under way.
+    /// Its bin in the current split.
     bin: u32,
 }
 
@@ -116,14 +116,14 @@ impl BoxTree {
         at_once(Self::new_paced(boxes.len(), |id| boxes[id], &Pace::default()))
     }
 
-    /// The same, with rests: over so many boxes, each asked for once.
+    /// The same as [paced](crate::synthesis::pace) work, over `count` boxes, each requested once.
     pub async fn new_paced(count: usize, box_of: impl Fn(usize) -> Bounds, pace: &Pace) -> Self {
         let item = |id: usize| Item { bounds: box_of(id), id: id as u32, bin: 0 };
         let mut items: Vec<Item> = pace.part(0.0..0.1).collect(count, item).await;
         let (pace, last) = (pace.part(0.1..0.95), pace.part(0.95..1.0));
         let mut stretch = Stretch::default();
         let mut nodes: Vec<Node> = Vec::with_capacity(items.len());
-        // Ranges still to be made into nodes, with the node whose second child they are.
+        // Ranges that are not nodes yet, with the node whose second child they are.
         let mut pending = Vec::new();
         if !items.is_empty() {
             pending.push((0, items.len(), None::<usize>, 0u32));
@@ -134,7 +134,7 @@ impl BoxTree {
                 nodes[parent].link = index as u32;
             }
             let range = &mut items[start..end];
-            // Those before are where they stay.
+            // The items before are in their final places.
             let done = start as f32 / count as f32;
             if stretch.ends_after(range.len().min(STRETCH)) {
                 pace.rest(done).await;
@@ -167,15 +167,16 @@ impl BoxTree {
         Self { nodes, order }
     }
 
-    /// For every slot the number of its box in the list that the tree was built from.
+    /// For every slot, the index of its box in the list that the tree was built from.
     pub fn order(&self) -> &[u32] {
         &self.order
     }
 
-    /// Visits boxes nearest to a point first, as long as they can be nearer than what was found.
+    /// Visits boxes in order of their distance to a point, while they can be nearer than the best found.
     ///
-    /// `visit(slot, best)` measures what is in the box and returns the squared distance of the best so far. The search
-    /// begins with `limit`. A box exactly as far as the best is still visited, so that ties can be broken by the caller.
+    /// `visit(slot, best)` measures the contents of the box and returns the squared distance of the best so far. The
+    /// search begins with `limit`. A box exactly as far as the best is still visited, so that ties can be broken by the
+    /// caller.
     #[inline]
     pub fn nearest(&self, point: Vec3, limit: f32, mut visit: impl FnMut(usize, f32) -> f32) {
         let point = Vec3A::from(point);
@@ -213,12 +214,12 @@ impl BoxTree {
         }
     }
 
-    /// Visits every box that has a point in common with `region`, until `visit` returns false.
+    /// Visits every box that shares a point with `region`, until `visit` returns false.
     pub fn overlapping(&self, region: &Bounds, visit: impl FnMut(usize) -> bool) {
         self.walk(|bounds| bounds.overlaps(region), visit);
     }
 
-    /// Visits boxes along the segment between two points, as long as they can be met before what was found.
+    /// Visits boxes along the segment between two points, while they can be hit before the first hit found.
     ///
     /// `visit(slot, limit)` returns the share of the segment, 0 to 1, up to which the search goes on.
     pub fn along(&self, from: Vec3, to: Vec3, mut visit: impl FnMut(usize, f32) -> f32) {
@@ -234,7 +235,7 @@ impl BoxTree {
         );
     }
 
-    /// Depth-first walk through the nodes whose box `enters` lets through, until `visit` returns false.
+    /// Depth-first traversal of the nodes whose box passes `enters`, until `visit` returns false.
     fn walk(&self, enters: impl Fn(&Bounds) -> bool, mut visit: impl FnMut(usize) -> bool) {
         let mut stack = [0u32; STACK];
         let mut depth = usize::from(!self.nodes.is_empty());
@@ -260,7 +261,8 @@ impl BoxTree {
     }
 }
 
-/// Sorts items to two sides by number, along the longest axis of their centres, and says how many are on the first.
+/// Splits items into equal numbers, along the longest axis of their centres, and returns how many are on the first
+/// side.
 fn halve(items: &mut [Item], centres: &Bounds) -> usize {
     let axis = (centres.max - centres.min).max_position();
     let half = items.len() / 2;
@@ -268,19 +270,19 @@ fn halve(items: &mut [Item], centres: &Bounds) -> usize {
     half
 }
 
-/// A split of items by a plane across an axis. What it does to all of them it may do to some at a time.
+/// A split of items by a plane across an axis. It may process some of them at a time.
 struct Split {
     axis: usize,
-    /// Where bins begin, and how many there are in a length.
+    /// Start of the bins, and their number per length.
     min: f32,
     scale: f32,
     bins: [(Bounds, u32); BINS],
-    /// Items that have been found to be on the first side.
+    /// Items found on the first side so far.
     middle: usize,
 }
 
 impl Split {
-    /// `None` where centres coincide, which can only be told apart by number; so can those of degenerate extents.
+    /// `None` if centres coincide or their extent is degenerate, so that only a split by number is possible.
     fn new(centres: &Bounds, depth: u32) -> Option<Self> {
         let size = centres.max - centres.min;
         let axis = size.max_position();
@@ -294,7 +296,7 @@ impl Split {
         })
     }
 
-    /// Takes note of the bins that some items fall into.
+    /// Sorts some items into bins.
     fn sort_into_bins(&mut self, items: &mut [Item]) {
         for item in items {
             item.bin = (((item.centre()[self.axis] - self.min) * self.scale) as u32).min(BINS as u32 - 1);
@@ -314,13 +316,13 @@ impl Split {
         }
     }
 
-    /// How many items are on the first side: at least one, and not all.
+    /// Number of items on the first side: at least one, and not all.
     fn end(&self, items: &[Item]) -> usize {
-        // The first and the last bin hold the outermost centres, so neither side is empty unless rounding has its way.
+        // The first and the last bin hold the outermost centres, so a side is empty only because of rounding.
         if self.middle == 0 || self.middle == items.len() { items.len() / 2 } else { self.middle }
     }
 
-    /// Sorts items to the two sides of the cheapest plane, and says how many are on the first.
+    /// Sorts items to the two sides of the cheapest plane, and returns how many are on the first.
     fn carry_out(mut self, items: &mut [Item]) -> usize {
         self.sort_into_bins(items);
         let plane = cheapest_plane(&self.bins);
@@ -328,7 +330,7 @@ impl Split {
         self.end(items)
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     async fn carry_out_paced(mut self, items: &mut [Item], pace: &Pace, done: f32) -> usize {
         for items in items.chunks_mut(STRETCH) {
             self.sort_into_bins(items);

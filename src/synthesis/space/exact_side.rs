@@ -1,24 +1,24 @@
-//! On which side of a plane a point lies: exact, whatever the rounding.
+//! The side of a plane on which a point lies, exact despite rounding.
 //!
 //! In: four points in f32. Out: the determinant of Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast
-//! Robust Geometric Predicates" (1997), whose sign is always right and is zero only for points of one plane. The plain
-//! value in f64 serves where his error bound (section 4.3) shows it to be good; elsewhere the sum is taken as an
-//! expansion, without rounding. Since the points come in f32, each product of two coordinates is exact in f64 and each
-//! product of three is the sum of two f64, so one stage of expansion suffices where his f64 points need three.
+//! Robust Geometric Predicates" (1997), whose sign is always right and is zero only for points in one plane. The plain
+//! f64 value is used if his error bound (section 4.3) allows it; otherwise the sum is computed as an expansion, without
+//! rounding. Since the points are f32, each product of two coordinates is exact in f64 and each product of three is the
+//! sum of two f64, so one stage of expansion suffices, whereas his f64 points need three.
 
 use bevy_math::{DVec3, Vec3};
 
 /// Bound of the rounding error of the plain determinant, as a multiple of its permanent: (7 + 56 ε) ε, ε = 2⁻⁵³.
 const ERROR: f64 = (7.0 + 56.0 * HALF_ULP) * HALF_ULP;
 const HALF_ULP: f64 = f64::EPSILON / 2.0;
-/// How far above its error bound the plain value must be to be taken. It then has 26 bits, two more than a share of a
-/// segment is stored with.
+/// Ratio to its error bound from which the plain value is used. It then has 26 bits, two more than a stored share of a
+/// segment.
 const TRUSTED: f64 = (1u64 << 26) as f64;
 /// Terms of the exact sum: two parts of each of the 24 products.
 const TERMS: usize = 48;
 
-/// Six times the signed volume of the tetrahedron of four points: positive where `d` lies below the plane of a, b, c,
-/// from which these run anticlockwise when seen from above; zero exactly where all four lie in one plane.
+/// Six times the signed volume of the tetrahedron of four points: positive if `d` lies below the plane of a, b, c,
+/// which run anticlockwise seen from above; zero exactly if all four lie in one plane.
 ///
 /// The sign is exact for all finite points; the value has a relative error below 2⁻²⁶.
 pub(crate) fn orientation(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
@@ -33,7 +33,7 @@ pub(crate) fn orientation(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
     if determinant.abs() > bound { determinant } else { exact(a, b, c, d) }
 }
 
-/// The same without rounding but that of the last step.
+/// The same, rounded only in the last step.
 fn exact(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
     let mut sum = Expansion { parts: [0.0; TERMS], len: 0 };
     // det(a−d, b−d, c−d) = [abc] − [bcd] + [cda] − [dab]
@@ -49,7 +49,7 @@ fn exact(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
     sum.value()
 }
 
-/// A number as the sum of f64 that don't overlap, the smallest first.
+/// A number as a sum of f64 whose bits don't overlap, the smallest first.
 struct Expansion {
     parts: [f64; TERMS],
     len: usize,

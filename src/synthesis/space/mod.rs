@@ -1,11 +1,11 @@
-//! Order in space: which points and boxes are near, and on which side of a plane a point lies.
+//! Spatial search: nearby points and boxes, and the side of a plane on which a point lies.
 //!
-//! | room | what it holds |
+//! | module | what it holds |
 //! |---|---|
-//! | [`point_grid`] | points that come and go, by distance |
-//! | [`bvh`] | boxes that stay |
-//! | `packed_boxes` | boxes that come and move |
-//! | `morton`, `order` | places along a curve through space |
+//! | [`point_grid`] | points that are added and removed, by distance |
+//! | [`bvh`] | fixed boxes |
+//! | `packed_boxes` | boxes that are added and move |
+//! | `morton`, `order` | spatial order of points |
 //! | `exact_side` | signs without rounding |
 
 pub mod bvh;

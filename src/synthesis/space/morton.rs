@@ -1,4 +1,4 @@
-//! A curve that fills space, so that neighbours on it are neighbours in space.
+//! A space-filling curve: neighbours on it are neighbours in space.
 
 use bevy_math::Vec3;
 
@@ -7,7 +7,7 @@ const KEY_BITS: u32 = 21;
 
 /// A space-filling curve through a box.
 ///
-/// The curve is Morton's: 21 bits of each coordinate, interleaved. What lies outside counts as at the nearest face.
+/// It is Morton's curve: 21 bits of each coordinate, interleaved. Points outside count as on the nearest face.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Curve {
     min: Vec3,
@@ -15,7 +15,7 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
-    /// A curve through the cube around points, made wider by a factor around its middle.
+    /// A curve through the cube around points, enlarged by a factor about its middle.
     pub(crate) fn around(points: impl Iterator<Item = Vec3>, wider: f32) -> Self {
         let around = |(min, max): (Vec3, Vec3), point: Vec3| (min.min(point), max.max(point));
         let (min, max) = points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), around);
@@ -25,7 +25,7 @@ impl Curve {
         if size > 0.0 { Self { min: min.midpoint(max) - 0.5 * size, scale: largest / size } } else { Self::default() }
     }
 
-    /// Where on the curve a point is.
+    /// Position of a point on the curve.
     pub(crate) fn key(&self, point: Vec3) -> u64 {
         // The cast saturates.
         let cell = ((point - self.min) * self.scale).as_uvec3().to_array().map(spread);
@@ -33,7 +33,7 @@ impl Curve {
     }
 }
 
-/// Moves the lowest 21 bits apart, two zeros between each two.
+/// Spreads the lowest 21 bits, with two zeros between neighbours.
 fn spread(bits: u32) -> u64 {
     let mut spread = u64::from(bits.min((1 << KEY_BITS) - 1));
     for (shift, mask) in [

@@ -1,4 +1,4 @@
-//! The order in which points lie in space, so that those that ask for the same memory come one after the other.
+//! Orders points in space, so that those that use the same memory are processed one after the other.
 
 use bevy_math::{UVec3, Vec3, Vec3A, bounding::Aabb3d};
 
@@ -7,7 +7,7 @@ const POINTS_PER_CELL: f32 = 8.0;
 /// Most cells along an axis.
 const MOST_CELLS: f32 = 1024.0;
 
-/// Sorts points into the cells of a box, row by row. Keeps its buffers.
+/// Sorts points into the cells of a box, row by row. Reuses its buffers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SpatialOrder {
     cells: Vec<u32>,
@@ -16,7 +16,7 @@ pub(crate) struct SpatialOrder {
 }
 
 impl SpatialOrder {
-    /// Sorts some points, those outside the box with its outermost cells. Points of a cell stay in their order.
+    /// Sorts some points. Those outside the box go to its outermost cells. Points of one cell keep their order.
     pub fn sort(&mut self, bounds: &Aabb3d, points: &[Vec3]) {
         let size = (bounds.max - bounds.min).max(Vec3A::ZERO);
         let longest = size.max_element().max(f32::MIN_POSITIVE);

@@ -1,14 +1,15 @@
 //! Boxes in packs of eight: a search tree without links, quick to build and to refit.
 //!
-//! Boxes come in an order in which neighbours in the list are neighbours in space, as a [`Curve`](super::morton::Curve) passes them. Eight
-//! in a row make a pack, eight packs in a row a pack of the next level, up to a single one: a packed R-tree (Kamel &
-//! Faloutsos, "On packing R-trees", CIKM 1993). Where a box is follows from its number alone, so nothing is stored but
-//! the boxes, a changed box is corrected along one path, and the eight of a pack are tested at once.
+//! Boxes are given in an order in which neighbours in the list are neighbours in space, such as that of a
+//! [`Curve`](super::morton::Curve). Eight consecutive boxes make a pack, eight consecutive packs a pack of the next
+//! level, up to a single one: a packed R-tree (Kamel & Faloutsos, "On packing R-trees", CIKM 1993). A box's number
+//! alone gives its place, so only boxes are stored, a changed box is corrected along one path, and the eight of a pack
+//! are tested at once.
 //!
-//! Why it is not [`BoxTree`](super::bvh::BoxTree), which splits by surface area and stays as it was built: over a
-//! million segments this one is built in half the time, follows boxes that move, and still answers what a small box
-//! meets in four thirds of the time, what a large one meets in less. Nor is it a grid: segments lie on sheets and in
-//! clusters, and one long segment among short ones would fill many cells.
+//! Why not [`BoxTree`](super::bvh::BoxTree), which splits by surface area and stays as built: over a million segments,
+//! this one is built in half the time and follows moving boxes; queries with a small box take four thirds of the time,
+//! with a large box less. Why not a grid: segments lie on sheets and in clusters, and one long segment among short ones
+//! would fill many cells.
 
 use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::Vec3;
@@ -17,13 +18,13 @@ use bevy_math::Vec3;
 const LANES: usize = 8;
 /// Most levels: 8¹¹ exceeds 2³².
 const LEVELS: usize = 11;
-/// Room for what is still to be visited: seven siblings stay behind on each level, and eight slots lie on the last.
+/// Size of the stack of pending visits: seven siblings on each level, and eight slots on the last.
 const STACK: usize = (LEVELS + 1) * LANES;
 
 /// Corners of a box.
 pub(crate) type Corners = (Vec3, Vec3);
 
-/// Eight boxes, coordinate by coordinate, so that a comparison takes all eight at once.
+/// Eight boxes, coordinate by coordinate, so that one comparison tests all eight.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pack {
     min: [[f32; LANES]; 3],
@@ -54,7 +55,7 @@ impl Pack {
         (min.into(), max.into())
     }
 
-    /// A bit for each box that has a point in common with another; none where that holds NaN.
+    /// A bit for each box that shares a point with the given one; none if that holds NaN.
     pub(crate) fn overlaps(&self, (min, max): Corners) -> u8 {
         let mut meets = [true; LANES];
         for axis in 0..3 {
@@ -65,7 +66,8 @@ impl Pack {
         bits(meets)
     }
 
-    /// A bit for each box that may have a point between all pairs of planes, of those that overlap the slabs' box.
+    /// A bit for each box that may have a point between all pairs of planes. Only valid for boxes that overlap the
+    /// slabs' box.
     pub(crate) fn enters(&self, slabs: &Slabs) -> u8 {
         let (mut middle, mut half) = ([[0f32; LANES]; 3], [[0f32; LANES]; 3]);
         for axis in 0..3 {
@@ -91,7 +93,7 @@ impl Pack {
         bits(meets)
     }
 
-    /// A bit for each box that a test lets through.
+    /// A bit for each box that passes a test.
     pub(crate) fn passes(&self, test: impl Fn(Vec3, Vec3) -> bool) -> u8 {
         bits(std::array::from_fn(|lane| {
             let (min, max) = self.get(lane);
@@ -99,7 +101,7 @@ impl Pack {
         }))
     }
 
-    /// Squared distance of each box from a point, never above what any point of the box has.
+    /// Squared distance of each box from a point, never above that of any point of the box.
     pub(crate) fn distances_squared(&self, point: Vec3) -> [f32; LANES] {
         let mut sums = [0.0; LANES];
         for axis in 0..3 {
@@ -111,14 +113,14 @@ impl Pack {
         sums.map(|sum| sum * SHORTENED)
     }
 
-    /// How far along a ray each box begins, never after any point of the box; infinity where the ray misses it.
+    /// Distance along a ray at which each box begins, never after any point of the box; infinity if the ray misses it.
     pub(crate) fn entries(&self, ray: &Ray) -> [f32; LANES] {
         let (mut near, mut far) = ([0f32; LANES], [f32::INFINITY; LANES]);
         for axis in 0..3 {
             let (from, inverse) = (ray.from[axis], ray.inverse[axis]);
             for lane in 0..LANES {
                 let (min, max) = (self.min[axis][lane], self.max[axis][lane]);
-                // Room for the rounding of the ray's direction over the distance to the box.
+                // Margin for the rounding of the ray's direction over the distance to the box.
                 let room = (min.abs().max(max.abs()) + from.abs()) * RAY_ROOM;
                 let (a, b) = ((min - room - from) * inverse, (max + room - from) * inverse);
                 near[lane] = near[lane].max(a.min(b));
@@ -133,9 +135,9 @@ impl Pack {
 const WIDENED: f32 = 1.0 + 2.0e-6;
 /// Factor that takes a few roundings off a length or its square.
 const SHORTENED: f32 = 1.0 - 1.0e-6;
-/// How far a slab is widened, relative to the coordinates of what lies in it.
+/// Amount by which a slab is widened, relative to the coordinates in it.
 const SLAB_ROOM: f32 = 2.0e-6;
-/// How far a box is widened against a ray, relative to its coordinates.
+/// Amount by which a box is widened against a ray, relative to its coordinates.
 const RAY_ROOM: f32 = 1.0e-6;
 
 fn bits(flags: [bool; LANES]) -> u8 {
@@ -146,12 +148,12 @@ fn bits(flags: [bool; LANES]) -> u8 {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
     from: Vec3,
-    /// 1 / direction, large where that is 0 instead of infinite, so that no product with 0 is NaN.
+    /// 1 / direction, but large instead of infinite for 0, so that no product with 0 is NaN.
     inverse: Vec3,
 }
 
 impl Ray {
-    /// A ray of a unit direction.
+    /// A ray with a unit direction.
     pub(crate) fn new(from: Vec3, direction: Vec3) -> Self {
         let inverse = |along: f32| if along.abs() < 1.0e-30 { 1.0e30 } else { along.recip() };
         Self { from, inverse: Vec3::from_array(direction.to_array().map(inverse)) }
@@ -163,11 +165,11 @@ impl Ray {
 pub(crate) struct Slabs([(Vec3, f32, f32); 3]);
 
 impl Slabs {
-    /// Slabs across three directions, unit or zero: from the least to the greatest product of a point with each. The
-    /// shape in between lies within a box, and only for boxes that overlap that are they right.
+    /// Slabs across three directions, unit or zero, each from the least to the greatest product of a point with it. The
+    /// shape in between lies within a box, and the slabs are only valid for boxes that overlap it.
     pub(crate) fn new((min, max): Corners, slabs: [(Vec3, [f64; 2]); 3]) -> Self {
-        // The middle of a box that overlaps is no farther out than this and half that box. The roundings of its product
-        // with an axis are in proportion.
+        // The middle of an overlapping box is no farther out than this plus half that box. The rounding errors of its
+        // product with an axis are in proportion.
         let far = min.abs().max(max.abs());
         Self(slabs.map(|(axis, [low, high])| {
             let room = SLAB_ROOM * axis.abs().dot(far);
@@ -176,7 +178,7 @@ impl Slabs {
     }
 }
 
-/// The tree over boxes in a given order. A box is known by its slot, its place in that order.
+/// The tree over boxes in a given order. A box is identified by its slot, its place in that order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PackedBoxes {
     /// All levels, the lowest first.
@@ -188,7 +190,7 @@ pub(crate) struct PackedBoxes {
 }
 
 impl PackedBoxes {
-    /// Packs `len` boxes, asked for in the order of their slots.
+    /// Packs `len` boxes, in the order of their slots.
     pub(crate) async fn new(len: usize, box_at: impl FnMut(usize) -> Corners, pace: &Pace) -> Self {
         let mut tree = Self::reserve(len);
         tree.packs.resize(tree.starts.last().map_or(0, |&end| end as usize), Pack::EMPTY);
@@ -215,7 +217,7 @@ impl PackedBoxes {
         self.put(slot / LANES, slot % LANES, corners);
     }
 
-    /// Lets the pack above take in one pack, the next in the order of the levels. Returns whether there was one to do so.
+    /// Adds one pack, the next in the order of the levels, to the pack above. Returns whether there was one.
     pub(crate) fn raise(&mut self, index: usize) -> bool {
         let level = self.starts.partition_point(|&start| start as usize <= index) - 1;
         if level + 1 >= self.levels() {
@@ -227,7 +229,7 @@ impl PackedBoxes {
         true
     }
 
-    /// Sets a box of a pack, the last there is or the next.
+    /// Sets a box of the last pack or the next.
     fn put(&mut self, index: usize, lane: usize, corners: Corners) {
         if index == self.packs.len() {
             self.packs.push(Pack::EMPTY);
@@ -240,7 +242,7 @@ impl PackedBoxes {
         self.packs[slot / LANES].get(slot % LANES)
     }
 
-    /// Measures every box anew.
+    /// Measures every box again.
     pub(crate) fn refit(&mut self, box_at: impl FnMut(usize) -> Corners) {
         at_once(self.refit_paced(box_at, &Pace::default()));
     }
@@ -260,7 +262,7 @@ impl PackedBoxes {
         }
     }
 
-    /// Changes one box, and those around it that have been raised.
+    /// Changes one box, and the boxes around it that have been raised.
     pub(crate) fn set(&mut self, slot: usize, corners: Corners) {
         let (mut item, mut corners) = (slot, corners);
         for level in 0..self.levels() {
@@ -283,7 +285,7 @@ impl PackedBoxes {
         self.starts.len() - 1
     }
 
-    /// Bits of the lanes of a pack that hold something.
+    /// Bits of the used lanes of a pack.
     fn used(&self, level: usize, index: u32) -> u8 {
         let items = match level {
             0 => self.len,
@@ -293,13 +295,13 @@ impl PackedBoxes {
         if rest >= LANES { u8::MAX } else { (1 << rest) - 1 }
     }
 
-    /// Visits every slot whose box `meets` marks in its pack, as it must mark the boxes around that.
+    /// Visits every slot whose box `meets` marks in its pack. `meets` must also mark the boxes around that one.
     pub(crate) fn walk(&self, meets: impl Fn(&Pack) -> u8, mut visit: impl FnMut(usize)) {
         let Some(top) = self.levels().checked_sub(1) else { return };
         let enter = |level: usize, index: u32| {
             (index, meets(&self.packs[(self.starts[level] + index) as usize]) & self.used(level, index))
         };
-        // The pack under way on each level, and its lanes still to be visited.
+        // The current pack on each level, and its lanes still to be visited.
         let mut stack = [(0u32, 0u8); LEVELS];
         let mut level = top;
         stack[level] = enter(level, 0);
@@ -323,11 +325,11 @@ impl PackedBoxes {
         }
     }
 
-    /// Visits slots from the lowest bound up, as long as they can be better than what was found.
+    /// Visits slots from the lowest bound up, while they can be better than the best found.
     ///
-    /// `bounds` gives for each box of a pack what nothing in it can fall below. `visit(slot, best)` measures what is in
-    /// a box and returns the best so far; the search begins with `limit` and ends with the best, which is returned. A
-    /// box whose bound equals the best is still visited, so that ties can be broken by the caller.
+    /// `bounds` gives a lower bound for each box of a pack. `visit(slot, best)` measures the contents of a box and
+    /// returns the best so far. The search begins with `limit` and returns the best. A box whose bound equals the best
+    /// is still visited, so that ties can be broken by the caller.
     pub(crate) fn best_first(
         &self,
         limit: f32,
@@ -335,8 +337,8 @@ impl PackedBoxes {
         mut visit: impl FnMut(usize, f32) -> f32,
     ) -> f32 {
         let mut best = limit;
-        // What is still to be visited: its bound, the number of levels below it, and its number on its level. A slot has
-        // none below it.
+        // Pending visits: the bound, the number of levels below, and the number on its level. A slot has no level
+        // below.
         let mut stack = [(0f32, 0u8, 0u32); STACK];
         let mut depth = 0;
         let mut next = (self.levels() > 0).then_some((f32::NEG_INFINITY, self.levels() as u8, 0));
@@ -347,7 +349,7 @@ impl PackedBoxes {
                     let used = self.used(level as usize, item);
                     let first = depth;
                     for (lane, &bound) in bounds.iter().enumerate() {
-                        // What is NaN fails it too.
+                        // NaN fails it, too.
                         if used & (1 << lane) != 0 && bound <= best {
                             // Kept in order, so that the nearest is on top.
                             let mut at = depth;

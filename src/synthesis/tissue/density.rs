@@ -1,4 +1,4 @@
-//! Density fields: where a tissue asks for more vessels and where for fewer, such as hypoxic regions.
+//! Density fields: where a tissue needs more or fewer vessels, such as in hypoxic regions.
 
 use crate::synthesis::{
     mesh::{IndexedMesh, TriangleMesh},
@@ -25,24 +25,24 @@ enum Field {
 }
 
 impl DensityField {
-    /// A field given by a function, for determinism's sake one that always gives the same value for the same point.
+    /// A field given by a function. For determinism, it must always give the same value for the same point.
     ///
-    /// Where the value is no number, no sample is kept.
+    /// Where the value is NaN, no sample is kept.
     pub fn function(field: impl Fn(Vec3) -> f32 + Send + Sync + 'static) -> Self {
         Self(Field::Function(Arc::new(field)))
     }
 
-    /// A field painted on a mesh: one value per vertex, interpolated over the triangles. Away from the mesh the value of
-    /// its nearest point counts.
+    /// A field painted on a mesh: one value per vertex, interpolated over the triangles. Away from the mesh, the value
+    /// at the nearest point of the mesh is used.
     ///
     /// # Errors
-    /// Values that are not one per vertex, or not a number.
+    /// A number of values other than one per vertex, or a value that is NaN.
     pub fn on_vertices(mesh: &TriangleMesh, values: &[f32]) -> Result<Self, TissueError> {
         let values = at_once(check(values, mesh.positions().len(), &Pace::default()))?;
         Ok(Self(Field::Vertices { mesh: IndexedMesh::new(mesh.clone()), values }))
     }
 
-    /// The same with the mesh's index at hand, which is shared.
+    /// The same with an existing index of the mesh, which is shared.
     ///
     /// # Errors
     /// Those of [`on_vertices`](Self::on_vertices).
@@ -57,10 +57,11 @@ impl DensityField {
     }
 
     /// A field on the points of a grid, along x first, then y, then z, interpolated between them. `origin` is the first
-    /// point. Beyond the grid the value at its border counts.
+    /// point. Beyond the grid, the value at its border is used.
     ///
     /// # Errors
-    /// Values that are not one per point, or not a number; a spacing that is not above 0; an origin that is not finite.
+    /// A number of values other than one per point, or a value that is NaN; a spacing that is not above 0; an origin
+    /// that is not finite.
     pub fn on_grid(size: UVec3, spacing: Vec3, origin: Vec3, values: &[f32]) -> Result<Self, TissueError> {
         let size = size.to_array().map(|count| count as usize);
         for side in spacing.to_array() {
@@ -131,7 +132,7 @@ fn interpolate(size: [usize; 3], local: Vec3, values: &[f32]) -> f32 {
 
 /// A tissue whose samples are kept with the local probability of a field.
 ///
-/// The shape of the tissue stays what it is: nodes may lie where the field is 0.
+/// The shape of the tissue stays: nodes may lie where the field is 0.
 #[derive(Clone, Debug)]
 pub struct DensityTissue {
     tissue: Arc<dyn Tissue>,
@@ -183,7 +184,7 @@ impl Tissue for DensityTissue {
     }
 
     fn point_of(&self, reach: f32, piece: [u32; 2], numbers: [f32; 3]) -> Option<Vec3> {
-        // Surfaces take two numbers of three.
+        // Surfaces use two of the three numbers.
         let point = self.tissue.point_of(reach, piece, numbers)?;
         (numbers[2] < self.field.at(point)).then_some(point)
     }

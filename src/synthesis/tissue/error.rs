@@ -23,7 +23,7 @@ pub enum TissueError {
         /// The value found.
         value: f32,
     },
-    /// The mesh has no voxels of the resolution.
+    /// The mesh cannot be voxelised at the resolution.
     #[error(transparent)]
     Voxels(#[from] VoxelError),
     /// A mesh that has no inside, such as a sheet.
@@ -42,7 +42,7 @@ pub enum TissueError {
         /// The value found.
         value: f32,
     },
-    /// A mask with another number of cells than its size says, or too many.
+    /// A mask whose number of cells differs from its size, or is too large.
     #[error("the mask has {cells} cells for a size of {size:?}; give one for each, at most {limit}")]
     MaskSize {
         /// Cells along each axis.
@@ -64,12 +64,12 @@ pub enum TissueError {
         limit: usize,
     },
     /// A guide without length.
-    #[error("a guide is {length} long; its points must not all coincide, on the tissue it is laid on neither")]
+    #[error("a guide is {length} long; its points must not all coincide, nor their nearest points on the tissue")]
     GuideLength {
         /// Its length.
         length: f32,
     },
-    /// Values of a density field that are not one for each vertex or grid point.
+    /// A density field without exactly one value for each vertex or grid point.
     #[error("the density field has {values} values; it needs {expected}, one for each vertex or grid point")]
     DensityCount {
         /// Number of values.
@@ -86,7 +86,7 @@ pub enum TissueError {
     /// A density field over a tissue that changes in stages.
     #[error("a density field cannot be put over a staged tissue; put it over its stages")]
     DensityOverStages,
-    /// Marks of a no-go region that are not one for each vertex.
+    /// A no-go region without exactly one mark for each vertex.
     #[error("{values} vertices are marked as no-go or free; the mesh has {expected}, give one mark for each")]
     NoGoCount {
         /// Number of marks.
@@ -97,26 +97,22 @@ pub enum TissueError {
     /// No-go regions over a tissue that changes in stages.
     #[error("no-go regions cannot be laid over a staged tissue; lay them over its stages")]
     NoGoOverStages,
-    /// A staged tissue as one that is to be painted.
+    /// Paint on a staged tissue.
     #[error("a staged tissue cannot be painted; prepare and paint its stages")]
     PaintOverStages,
-    /// Something painted on the vertices of a tissue that has none.
+    /// Paint on the vertices of a tissue that has none.
     #[error(
-        "{what} is painted on vertices, but the tissue is not made of a mesh; leave it out, or mark balls and boxes"
+        "{what} is painted on vertices, but the tissue is not made from a mesh; leave it out, or mark balls and boxes"
     )]
     NoVertices {
         /// What is painted.
         what: &'static str,
     },
-    /// A tissue that is to be made of a mesh without one.
-    #[error(
-        "the tissue is to be made of the organ's mesh, but there is none; give the organ a mesh, or choose a shape"
-    )]
+    /// A tissue made from a mesh, without a mesh.
+    #[error("the tissue is made from the organ's mesh, but there is none; give the organ a mesh, or choose a shape")]
     NoMesh,
-    /// A tissue that is to be made of an image without one.
-    #[error(
-        "the tissue is to be made of the organ's image, but there is none; give the organ an image, or choose a shape"
-    )]
+    /// A tissue made from an image, without an image.
+    #[error("the tissue is made from the organ's image, but there is none; give the organ an image, or choose a shape")]
     NoImage,
     /// A staged tissue as the stage of another.
     #[error("a stage of a staged tissue cannot be staged itself; list its stages instead")]
@@ -129,13 +125,13 @@ pub enum TissueError {
     },
 }
 
-/// Passes a number that is finite and not beyond reason.
+/// Checks that a number is finite and within [`MAX_COORDINATE`].
 pub(super) fn finite(what: &'static str, value: f32) -> Result<f32, TissueError> {
-    // NaN fails it too.
+    // NaN fails it, too.
     if value.abs() <= MAX_COORDINATE { Ok(value) } else { Err(TissueError::NotFinite { what, value }) }
 }
 
-/// Passes a point or vector whose coordinates are finite.
+/// Checks that the coordinates of a point or vector are finite.
 pub(super) fn finite_point(what: &'static str, point: Vec3) -> Result<Vec3, TissueError> {
     for value in point.to_array() {
         finite(what, value)?;
@@ -143,7 +139,7 @@ pub(super) fn finite_point(what: &'static str, point: Vec3) -> Result<Vec3, Tiss
     Ok(point)
 }
 
-/// Passes a size that is finite and above zero.
+/// Checks that a size is finite and above zero.
 pub(super) fn positive(what: &'static str, value: f32) -> Result<f32, TissueError> {
     if finite(what, value)? > 0.0 { Ok(value) } else { Err(TissueError::NotPositive { what, value }) }
 }

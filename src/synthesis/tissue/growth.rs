@@ -1,7 +1,7 @@
-//! Tissue growth: how much larger the organ is after each step (Rauch & Harders 2021, section 3, "Vessel Tree Updates").
+//! Tissue growth: the size of the organ after each step (Rauch & Harders 2021, section 3, "Vessel Tree Updates").
 //!
-//! Nothing is moved. Positions stay relative to the tissue, and every length of the settings is multiplied by
-//! λ_t = σ₀/σ_t instead, so vessels become finer as the organ grows.
+//! Nothing moves. Positions stay relative to the tissue; instead, every length of the settings is multiplied by λ_t =
+//! σ₀/σ_t, so vessels become finer as the organ grows.
 
 /// Growth of the tissue during a step, as a law for its size σ relative to the start (σ₀ = 1).
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub enum TissueGrowth {
     Linear(f32),
     /// σ rises by this share of itself each step.
     Exponential(f32),
-    /// σ after each step, from the first on; the last value stays in force. For laws of the user's own.
+    /// σ after each step, from the first on; the last value stays in force. For custom laws.
     Table(Vec<f32>),
 }
 
@@ -22,7 +22,7 @@ impl TissueGrowth {
     /// The paper's increment of σ in a step.
     pub const DEFAULT_LINEAR: f32 = 0.02;
 
-    /// Tabulates a law of the user's own for `steps` steps: `law(step)` is σ after that step, `law(1)` being the first.
+    /// Tabulates a custom law for `steps` steps: `law(step)` is σ after that step, and `law(1)` the first value.
     pub fn from_fn(steps: u32, law: impl Fn(u32) -> f32) -> Self {
         Self::Table((1..=steps).map(law).collect())
     }
@@ -40,7 +40,7 @@ impl TissueGrowth {
         }
     }
 
-    /// Whether the size stays as it is from the end of a step on.
+    /// Whether the size stays constant after a step.
     pub(crate) fn is_over(&self, step: u32) -> bool {
         match self {
             Self::None => true,

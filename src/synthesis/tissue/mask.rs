@@ -13,13 +13,13 @@ use crate::synthesis::{
 use bevy_math::{UVec2, UVec3, Vec2, Vec3, Vec3A, bounding::Aabb3d};
 use rand::RngExt;
 
-/// Distance, in the longest side of a cell, within which a point counts as part of a cell.
+/// Distance within which a point counts as part of a cell, as a share of the cell's longest side.
 const TOLERANCE: f32 = 1.0e-4;
 
 /// Cells of a regular grid, set or not.
 ///
-/// Cells are listed along x first, then y, then z, each axis upwards: an image whose first row is its top has to be given
-/// upside down. Every set cell belongs to the tissue as a whole, a rectangle or a box.
+/// Cells are listed along x first, then y, then z, each axis upwards: flip an image whose first row is its top. Every
+/// set cell belongs to the tissue as a whole, as a rectangle or a box.
 #[derive(Clone, Debug)]
 pub struct Mask {
     size: [usize; 3],
@@ -45,13 +45,13 @@ impl Mask {
     /// `origin` is the lowest corner of the first pixel. The image lies in the plane z = `origin.z` and faces up.
     ///
     /// # Errors
-    /// A list that does not have one entry per pixel, or none that is set; a spacing that is not above 0; coordinates that
-    /// are not finite.
+    /// A list without exactly one entry per pixel, or without a set pixel; a spacing that is not above 0; coordinates
+    /// that are not finite.
     pub fn image(size: UVec2, spacing: Vec2, origin: Vec3, inside: &[bool]) -> Result<Self, TissueError> {
         at_once(Self::image_paced(size, spacing, origin, inside, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`image`](Self::image).
@@ -62,7 +62,7 @@ impl Mask {
         inside: &[bool],
         pace: &Pace,
     ) -> Result<Self, TissueError> {
-        // The thickness of a pixel is of no account.
+        // The thickness of a pixel doesn't matter.
         Self::new(size.extend(1), [spacing.extend(1.0), origin], inside, true, pace).await
     }
 
@@ -85,13 +85,13 @@ impl Mask {
     /// `origin` is the lowest corner of the first voxel.
     ///
     /// # Errors
-    /// A list that does not have one entry per voxel, or none that is set; a spacing that is not above 0; coordinates that
-    /// are not finite.
+    /// A list without exactly one entry per voxel, or without a set voxel; a spacing that is not above 0; coordinates
+    /// that are not finite.
     pub fn voxels(size: UVec3, spacing: Vec3, origin: Vec3, inside: &[bool]) -> Result<Self, TissueError> {
         at_once(Self::voxels_paced(size, spacing, origin, inside, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`voxels`](Self::voxels).
@@ -193,7 +193,7 @@ impl Mask {
         (runs, bounds)
     }
 
-    /// The point at a place within a cell, from 0 to 1 along each axis.
+    /// The point at a position within a cell, from 0 to 1 along each axis.
     fn corner(&self, cell: usize, within: Vec3) -> Vec3 {
         let [x, y, _] = self.size;
         let first = Vec3::new((cell % x) as f32, (cell / x % y) as f32, (cell / (x * y)) as f32);
@@ -201,7 +201,7 @@ impl Mask {
         if self.flat { point.with_z(self.origin.z) } else { point }
     }
 
-    /// The cell around a point, whatever its height over an image.
+    /// The cell around a point, at any height over an image.
     fn cell(&self, point: Vec3) -> Option<usize> {
         let local = (point - self.origin) / self.spacing;
         let local = if self.flat { local.with_z(0.0) } else { local };
@@ -212,7 +212,7 @@ impl Mask {
 
     fn tolerance(&self) -> f32 {
         let spacing = if self.flat { self.spacing.truncate().max_element() } else { self.spacing.max_element() };
-        // Far from the origin, rounding is more than that.
+        // Far from the origin, rounding exceeds that.
         let rounding = f32::EPSILON * self.bounds.min.abs().max(self.bounds.max.abs()).max_element();
         (TOLERANCE * spacing).max(4.0 * rounding)
     }

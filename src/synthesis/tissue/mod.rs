@@ -1,8 +1,7 @@
 //! Tissue: the part of space that vessels supply.
 //!
-//! A tissue answers four questions: how large it is, whether a point belongs to it, which of its points is closest to a
-//! given one, and where the next attraction point is drawn. Points, normals and lengths are in the local space of the
-//! organ's mesh ("tissue lengths").
+//! A tissue gives four things: its size, whether it contains a point, its closest point to a given one, and random
+//! attraction points. Points, normals and lengths are in the local space of the organ's mesh ("tissue lengths").
 //!
 //! | kind | what it is |
 //! |---|---|
@@ -11,12 +10,13 @@
 //! | [`volume`] | what an organ's mesh encloses, voxelised |
 //! | [`mask`] | the set pixels or voxels of an image |
 //! | [`path`] | guides: polylines with a deviation |
-//! | [`density`] | any of these, with regions that ask for more or fewer vessels |
+//! | [`density`] | any of these, with regions of more or fewer vessels |
 //! | [`no_go`] | any of these, with regions where no vessel may be |
-//! | [`staged`] | one after the other |
+//! | [`staged`] | several of these, one after the other |
 //!
-//! [`source`] says as data where the tissue of an organ comes from: its mesh, a shape or an image. What takes long is done
-//! once, and gives a [`PreparedTissue`]; [`paint`], which is data too, is laid over that as often as one likes.
+//! [`source`] describes, as data, where the tissue of an organ comes from: its mesh, a shape or an image. The slow work
+//! is done once, and gives a [`PreparedTissue`]. [`paint`], which is also data, can be laid over that any number of
+//! times.
 
 pub mod density;
 mod error;
@@ -57,13 +57,13 @@ use std::fmt::Debug;
 /// A point of a tissue, found from a point nearby.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TissuePoint {
-    /// Where it is, in tissue lengths.
+    /// Its position, in tissue lengths.
     pub position: Vec3,
     /// Unit normal of the tissue's surface there; `Vec3::ZERO` inside a volume, where none is defined.
     pub normal: Vec3,
 }
 
-/// How many dimensions a tissue extends in, with its size.
+/// The dimension of a tissue, with its size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
     /// A curve, of this length.
@@ -88,7 +88,7 @@ impl Extent {
     }
 }
 
-/// Space that vessels grow to supply.
+/// The space that vessels supply.
 pub trait Tissue: Debug + Send + Sync {
     /// A box that holds the whole tissue.
     fn bounds(&self) -> Aabb3d;
@@ -98,56 +98,57 @@ pub trait Tissue: Debug + Send + Sync {
 
     /// Whether a point belongs to the tissue.
     ///
-    /// A surface or a curve has no inside: for it this is true within a small tolerance. Every point that
-    /// [`sample`](Self::sample) or [`closest_point`](Self::closest_point) gives is contained.
+    /// A surface or a curve has no inside, so it contains points within a small tolerance. Every point from
+    /// [`sample`](Self::sample) or [`closest_point`](Self::closest_point) is contained.
     fn contains(&self, point: Vec3) -> bool;
 
-    /// The point of the tissue nearest to `point`: `point` itself where the tissue contains it.
+    /// The point of the tissue nearest to `point`: `point` itself if the tissue contains it.
     fn closest_point(&self, point: Vec3) -> TissuePoint;
 
     /// Draws one candidate for an attraction point, uniformly by length, area or volume.
     ///
-    /// `None` when this draw fell on nothing: beside the tissue, on a spot that its density field turned down, or on a
-    /// tissue of no size. The caller counts it as a sample all the same.
+    /// `None` if this draw failed: it fell beside the tissue, its density field rejected it, or the tissue has no size.
+    /// The caller still counts it as a sample.
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3>;
 
-    /// Appends `count` candidates, less those that fell on nothing: as many calls of [`sample`](Self::sample), unless the
-    /// tissue knows a faster way to draw many.
+    /// Appends `count` candidates, less those that failed, as by `count` calls of [`sample`](Self::sample). A tissue
+    /// may have a faster way to draw many.
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
         candidates.extend((0..count).filter_map(|_| self.sample(rng)));
     }
 
-    /// Appends pieces that make up the whole tissue, none of them larger than a ball of radius `reach`, as far as that can be
-    /// arranged. `false`, and nothing appended, for a tissue that cannot be cut.
+    /// Appends pieces that make up the whole tissue, each within a ball of radius `reach` if possible. Returns `false`,
+    /// and appends nothing, for a tissue that cannot be cut.
     ///
-    /// A growth that knows which pieces are supplied draws its candidates from the others. Pieces of equal measure are drawn
-    /// from faster.
+    /// A growth can then draw candidates only from pieces that are not supplied. Pieces of equal measure are drawn from
+    /// faster.
     fn cut(&self, _reach: f32, _pieces: &mut Vec<TissuePiece>) -> bool {
         false
     }
 
-    /// The point that three even numbers from 0 to below 1 choose from a piece that [`cut`](Self::cut) gave for this `reach`:
-    /// uniformly, as [`sample`](Self::sample) would among those of its points that fall into the piece. `None` as there.
+    /// The point of a piece from [`cut`](Self::cut) for this `reach`, chosen by three uniform numbers from 0 to below
+    /// 1: distributed as the points of [`sample`](Self::sample) in the piece. `None` as there.
     fn point_of(&self, _reach: f32, _piece: [u32; 2], _numbers: [f32; 3]) -> Option<Vec3> {
         None
     }
 
-    /// Where vessels enter the tissue of themselves, if there is such a place: the beginning of a guide.
+    /// The natural entrance of vessels to the tissue, if there is one: the beginning of a guide.
     fn entrance(&self) -> Option<Vec3> {
         None
     }
 
-    /// Where no vessel may be; `None` where vessels may be everywhere, so that nothing has to be asked.
+    /// Where no vessel may be; `None` if vessels may be everywhere.
     ///
-    /// [`sample`](Self::sample), [`draw`](Self::draw), [`point_of`](Self::point_of) and [`entrance`](Self::entrance) give no
-    /// point that this forbids. A generator places no node there; [`closest_point`](Self::closest_point) doesn't know of it.
+    /// [`sample`](Self::sample), [`draw`](Self::draw), [`point_of`](Self::point_of) and [`entrance`](Self::entrance)
+    /// give no point that this forbids. A generator places no node there; [`closest_point`](Self::closest_point)
+    /// ignores it.
     fn no_go(&self) -> Option<&NoGoField> {
         None
     }
 
-    /// The tissue that takes the place of this one at a growth step, counted from 1; `None` where this one stays.
+    /// The tissue that replaces this one at a growth step, counted from 1; `None` if this one stays.
     ///
-    /// Only tissues that change in stages have one. To ask for the tissue in force, call
+    /// Only tissues that change in stages have one. For the tissue in force, call
     /// [`at_step`](trait@Tissue#method.at_step), which every `dyn Tissue` has.
     fn stage(&self, _step: u32) -> Option<&dyn Tissue> {
         None

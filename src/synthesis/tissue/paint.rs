@@ -1,39 +1,40 @@
-//! Paint: what is laid over the tissue of an organ, as data. Where more vessels grow and where fewer, where none may be, and
-//! along which lines large ones are led.
+//! Paint over the tissue of an organ, as data: where more or fewer vessels grow, where none may be, and guide lines for
+//! large ones.
 //!
-//! [`PreparedTissue::painted`](super::PreparedTissue::painted) lays it over a tissue that has been prepared, which is cheap:
-//! a stroke of a brush prepares nothing again.
+//! [`PreparedTissue::painted`](super::PreparedTissue::painted) lays it over a prepared tissue, which is cheap: a brush
+//! stroke prepares nothing again.
 
 use super::{GuidePath, NoGoRegion, TissueError, no_go::NoGoField};
 use crate::synthesis::{mesh::IndexedMesh, pace::Pace};
 use bevy_math::Vec3;
 
-/// What is laid over the tissue of an organ. The default is nothing.
+/// The paint over the tissue of an organ. The default is blank.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct TissuePaint {
-    /// Probability with which attraction points are kept, at every vertex of the mesh, and between them in proportion.
-    /// Guides are not concerned.
+    /// Probability with which attraction points are kept, at every vertex of the mesh, interpolated in between. Guides
+    /// are not affected.
     ///
-    /// Higher values make for more vessels.
+    /// Higher values give more vessels.
     ///
-    /// Limits: one value per vertex; those outside 0 to 1 are clamped. Only for tissues made of a mesh. Default: 1 everywhere.
+    /// Limits: one value per vertex; those outside 0 to 1 are clamped. Only for tissues made from a mesh. Default: 1
+    /// everywhere.
     pub density: Option<Vec<f32>>,
     /// Where no vessel may be.
     ///
     /// Default: nowhere.
     pub no_go: NoGo,
-    /// Lines along which large vessels are led before the rest grows. They keep to the surface, or to the inside where
-    /// vessels grow through it from the start.
+    /// Lines along which large vessels grow before the rest. They keep to the surface, or to the inside if vessels grow
+    /// through it from the start.
     ///
     /// Default: none.
     pub guides: Vec<Guide>,
 }
 
 impl TissuePaint {
-    /// Whether it changes nothing.
+    /// Whether this is blank.
     pub fn is_blank(&self) -> bool {
         self.density.is_none() && self.no_go.is_empty() && self.guides.is_empty()
     }
@@ -54,20 +55,20 @@ impl TissuePaint {
     }
 }
 
-/// Where no vessel may be: no attraction point is drawn there, no root put, no node placed, along guides neither.
+/// Where no vessel may be: no attraction point, root or node is placed there, not even along guides.
 ///
-/// Vessels find their way round, and supply the other side if tissue leads there. A region narrower than half a step may
-/// still be crossed by a segment between two nodes outside it. Nodes of a given tree stay where they are. Tissue that is
-/// forbidden as a whole has no place for a root, which is an error; vessels of a given tree don't grow there.
+/// Vessels grow around it, and supply the other side if tissue leads there. A segment between two nodes outside may
+/// still cross a region narrower than half a step. Nodes of a given tree stay where they are. If the whole tissue is
+/// forbidden, roots have no place, which is an error; vessels of a given tree don't grow there.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct NoGo {
-    /// Which vertices of the mesh are painted. Between a painted and a free one the line is halfway; what lies below
+    /// Which vertices of the mesh are painted. The boundary is halfway between a painted and a free one. Tissue below
     /// painted surface is forbidden, too.
     ///
-    /// Limits: one entry per vertex. Only for tissues made of a mesh. Default: none.
+    /// Limits: one entry per vertex. Only for tissues made from a mesh. Default: none.
     pub vertices: Option<Vec<bool>>,
     /// Balls and boxes.
     ///
@@ -81,7 +82,7 @@ impl NoGo {
         self.regions.is_empty() && self.vertices.as_ref().is_none_or(|vertices| !vertices.contains(&true))
     }
 
-    /// The field of these regions, `None` where nothing is forbidden. `mesh` is asked for where vertices are painted.
+    /// The field of these regions, `None` if nothing is forbidden. `mesh` is only called if vertices are painted.
     pub(super) async fn field<'a>(
         &self,
         mesh: impl FnOnce() -> Result<&'a IndexedMesh, TissueError>,
@@ -95,33 +96,33 @@ impl NoGo {
     }
 }
 
-/// A line along which large vessels are led.
+/// A guide line for large vessels.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Guide {
-    /// Its points in order. They are brought to the nearest points of the tissue. A root that is put automatically is put
-    /// at the first.
+    /// Its points in order. They are moved to the nearest points of the tissue. An automatic root is placed at the
+    /// first.
     ///
     /// Units: tissue lengths, in the organ's local space. Limits: at least 2.
     pub points: Vec<Vec3>,
-    /// How far from the line attraction points are drawn.
+    /// Distance from the line within which attraction points are drawn.
     ///
-    /// Higher values make for more vessels along the guide, and more wayward ones.
+    /// Higher values give more vessels along the guide, which follow it less closely.
     ///
     /// Units: tissue lengths. Limits: ≥ 0. Default: 0.
     pub deviation: f32,
     /// Steps for which attraction points are drawn along this guide only. Guides follow each other.
     ///
-    /// Too few leave the guide's end without a vessel: about its length over the step length is right.
+    /// With too few, no vessel reaches the guide's end. A good value is its length divided by the step length.
     ///
     /// Default: [`Self::DEFAULT_STEPS`].
     pub steps: u32,
 }
 
 impl Guide {
-    /// Steps along a guide.
+    /// Default of [`steps`](Self::steps).
     pub const DEFAULT_STEPS: u32 = 20;
 }
 

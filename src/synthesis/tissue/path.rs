@@ -1,5 +1,5 @@
-//! Guides: polylines along which large vessels are led before the tissue around them is filled (Rauch & Harders 2021,
-//! Fig. 4).
+//! Guides: polylines along which large vessels grow before the tissue around them is filled (Rauch & Harders 2021, Fig.
+//! 4).
 
 use crate::synthesis::{
     mesh::is_usable,
@@ -27,12 +27,12 @@ const WORK_OF_PIECE: usize = 8;
 const MAX_POINTS: usize = 1 << 20;
 /// Most tries at a sample.
 const TRIES: u32 = 16;
-/// What a guide's own points are forgiven, relative to the guide's length.
+/// Tolerance for a guide's own points, relative to its length.
 const TOLERANCE: f32 = 1.0e-5;
 
 /// A polyline with a deviation: the tube around it in which points are drawn.
 ///
-/// Points are drawn evenly along the line and displaced within a ball of the deviation's radius. A guide laid
+/// Points are drawn uniformly along the line and displaced within a ball of the deviation's radius. A guide laid
 /// [over](Self::over) a surface keeps to the surface.
 #[derive(Clone, Debug)]
 pub struct GuidePath {
@@ -43,7 +43,7 @@ pub struct GuidePath {
     deviations: [f32; 2],
     index: BoxTree,
     base: Option<Arc<dyn Tissue>>,
-    /// Distance from the line, beside the deviation, at which the tissue below may lie.
+    /// Distance from the line, besides the deviation, within which the tissue below may lie.
     slack: f32,
 }
 
@@ -56,7 +56,7 @@ struct Foot {
 }
 
 impl GuidePath {
-    /// A guide along `points`, with this `deviation` on all its length.
+    /// A guide along `points`, with this `deviation` over its whole length.
     ///
     /// # Errors
     /// Fewer than two points, points that all coincide, coordinates that are not finite, a deviation below 0.
@@ -78,7 +78,7 @@ impl GuidePath {
         WORK_OF_PIECE * (points + PIECES as usize)
     }
 
-    /// The same guide with a deviation that changes evenly to this value at its end.
+    /// The same guide with a deviation that changes linearly to this value at its end.
     ///
     /// # Errors
     /// A deviation that is below 0 or not finite.
@@ -90,12 +90,12 @@ impl GuidePath {
     /// The same guide laid on another tissue: it follows the tissue's nearest points, and so do the points drawn from it.
     ///
     /// # Errors
-    /// A guide that comes to lie in one point.
+    /// A guide whose points all move to one point.
     pub fn over(self, base: Arc<dyn Tissue>) -> Result<Self, TissueError> {
         at_once(self.over_paced(base, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`over`](Self::over).
@@ -157,7 +157,7 @@ impl GuidePath {
         self.deviations[0] + (self.deviations[1] - self.deviations[0]) * share
     }
 
-    /// How far from the line a point at a foot may be.
+    /// Largest distance from the line of a point at a foot.
     fn reach(&self, foot: &Foot) -> f32 {
         self.deviation(foot.share) + self.slack + TOLERANCE * self.length()
     }
@@ -220,12 +220,12 @@ impl Tissue for GuidePath {
             && self.base.as_ref().is_none_or(|base| base.contains(point))
     }
 
-    /// The nearest point of the tube around the line; for one that tapers, seen from the nearest place on the line.
+    /// The nearest point of the tube around the line; if it tapers, from the nearest place on the line.
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         let Some(foot) = self.foot(point) else { return TissuePoint { position: point, normal: Vec3::ZERO } };
         let offset = (point - foot.position).clamp_length_max(self.deviation(foot.share));
         let found = self.on_base(foot.position + offset);
-        // Where the tissue below bends away, the line itself is always near enough.
+        // If the tissue below bends away, the line itself is always near enough.
         if self.contains(found.position) { found } else { self.on_base(foot.position) }
     }
 

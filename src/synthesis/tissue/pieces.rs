@@ -11,11 +11,11 @@ pub struct TissuePiece {
     pub reach: f32,
     /// Length, area or volume of the piece.
     pub measure: f32,
-    /// Which piece it is: the tissue's own business, for [`Tissue::point_of`](super::Tissue::point_of).
+    /// The tissue's own identifier of the piece, for [`Tissue::point_of`](super::Tissue::point_of).
     pub id: [u32; 2],
 }
 
-/// Number of equal parts, at least one, in which a length is cut so that none is longer than `side`.
+/// Number of equal parts, at least one, into which a length is cut so that none is longer than `side`.
 pub(super) fn parts(length: f32, side: f32) -> u32 {
     (length / side).ceil().clamp(1.0, 1e6) as u32
 }

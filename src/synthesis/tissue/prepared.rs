@@ -1,30 +1,27 @@
-//! A tissue with everything that takes long to prepare, kept so that paint can be laid over it again and again.
+//! A tissue with all slow preparation done, so that paint can be laid over it any number of times.
 
-use super::{
-    DensityField, DensityTissue, GuidePath, MeshSurface, MeshTissue, MeshVolume, NoGoField, NoGoTissue, Staged, Tissue,
-    TissueError, TissueMode, TissuePaint,
-};
+use super::{DensityField, DensityTissue, GuidePath, NoGoField, NoGoTissue, Staged, Tissue, TissueError, TissuePaint};
 use crate::synthesis::{
     mesh::{IndexedMesh, TriangleMesh},
     pace::{Pace, at_once},
 };
 use std::sync::{Arc, OnceLock};
 
-/// A tissue made from its [source](super::TissueSource), before anything is painted on it. A clone shares all of it.
+/// A tissue made from its [source](super::TissueSource), without paint. A clone shares all of it.
 ///
 /// The indices, voxels and surfaces of an organ are made once. [`painted`](Self::painted) tissues share them.
 #[derive(Clone, Debug)]
 pub struct PreparedTissue {
-    /// Tissues that are in force before the last, each for a number of steps.
+    /// Tissues in force before the last, each for a number of steps.
     stages: Vec<(Arc<dyn Tissue>, u32)>,
     last: Arc<dyn Tissue>,
-    /// The tissue as it is without paint.
+    /// The tissue without paint.
     plain: Arc<dyn Tissue>,
-    /// What vertices are painted on; `None` for tissues that are not made of a mesh.
+    /// The mesh for paint on vertices; `None` for tissues that are not made from a mesh.
     canvas: Option<Arc<Canvas>>,
 }
 
-/// The mesh that vertices belong to, indexed when it is first painted on.
+/// A mesh that can be painted, indexed when it is first painted on.
 #[derive(Debug)]
 struct Canvas {
     mesh: Arc<TriangleMesh>,
@@ -32,7 +29,7 @@ struct Canvas {
 }
 
 impl Canvas {
-    /// Makes the index where it has yet to be made.
+    /// Makes the index if there is none yet.
     async fn index(&self, pace: &Pace) {
         if self.indexed.get().is_none() {
             let indexed = IndexedMesh::new_paced(Arc::clone(&self.mesh), pace).await;
@@ -46,10 +43,10 @@ impl Canvas {
 }
 
 impl PreparedTissue {
-    /// Any tissue but a mesh's: density and painted vertices have no place on it.
+    /// A tissue that is not made from a mesh: it takes no density and no painted vertices.
     ///
     /// # Errors
-    /// A tissue that changes in stages: paint is laid over each of them.
+    /// A tissue that changes in stages: paint its stages instead.
     pub fn new(tissue: Arc<dyn Tissue>) -> Result<Self, TissueError> {
         if tissue.stage(1).is_some() {
             return Err(TissueError::PaintOverStages);
@@ -57,35 +54,17 @@ impl PreparedTissue {
         Ok(Self { stages: Vec::new(), last: Arc::clone(&tissue), plain: tissue, canvas: None })
     }
 
-    /// The tissue of a mesh.
+    /// The tissues of a mesh: stages, each for a number of steps, and the last. `indexed` is empty if none of them
+    /// needs an index of the triangles.
     ///
     /// # Errors
-    /// [`TissueError::Voxels`] and [`TissueError::NoInside`], where the inside is needed.
-    pub(super) async fn of_mesh(
+    /// Tissues that cannot form a [`Staged`] one.
+    pub(super) fn of_mesh(
         mesh: Arc<TriangleMesh>,
-        settings: &MeshTissue,
-        pace: &Pace,
+        indexed: OnceLock<IndexedMesh>,
+        stages: Vec<(Arc<dyn Tissue>, u32)>,
+        last: Arc<dyn Tissue>,
     ) -> Result<Self, TissueError> {
-        let indexed = OnceLock::new();
-        let surface = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
-            let surface = MeshSurface::new_paced(Arc::clone(&mesh), &pace).await?;
-            indexed.get_or_init(|| surface.indexed().clone());
-            let surface: Arc<dyn Tissue> = Arc::new(surface);
-            Ok(surface)
-        };
-        let volume = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
-            let volume: Arc<dyn Tissue> = Arc::new(MeshVolume::new_paced(&mesh, settings.resolution, &pace).await?);
-            Ok(volume)
-        };
-        let (stages, last) = match settings.mode {
-            TissueMode::Surface => (Vec::new(), surface(pace.clone()).await?),
-            TissueMode::Volume => (Vec::new(), volume(pace.clone()).await?),
-            TissueMode::Staged { surface_steps } => {
-                let first = surface(pace.part(0.0..0.2)).await?;
-                (vec![(first, surface_steps)], volume(pace.part(0.2..1.0)).await?)
-            }
-        };
-        pace.rest(1.0).await;
         let plain = in_stages(stages.clone(), Arc::clone(&last))?;
         Ok(Self { stages, last, plain, canvas: Some(Arc::new(Canvas { mesh, indexed })) })
     }
@@ -100,18 +79,19 @@ impl PreparedTissue {
         self.canvas.as_ref().map(|canvas| &*canvas.mesh)
     }
 
-    /// The tissue with paint laid over it. Nothing that was prepared is prepared again. Where nothing is painted, this is
-    /// the [`tissue`](Self::tissue) itself.
+    /// The tissue with paint laid over it. Nothing is prepared again. With blank paint, this is the
+    /// [`tissue`](Self::tissue) itself.
     ///
-    /// The first time that vertices of a mesh are painted whose surface is no tissue, an index of its triangles is made.
+    /// If the mesh's surface is not part of the tissue, the first paint on its vertices makes an index of its
+    /// triangles.
     ///
     /// # Errors
-    /// What is wrong with the paint: see [`TissueError`].
+    /// Invalid paint: see [`TissueError`].
     pub fn painted(&self, paint: &TissuePaint) -> Result<Arc<dyn Tissue>, TissueError> {
         at_once(self.painted_paced(paint, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`painted`](Self::painted).
@@ -132,7 +112,7 @@ impl PreparedTissue {
         };
         let no_go = paint.no_go.field(|| self.canvas("a no-go region"), &pace.part(0.45..0.5)).await?;
         let laid = |tissue: &Arc<dyn Tissue>| guarded(thinned(Arc::clone(tissue), density.as_ref())?, no_go.as_ref());
-        // Guides lie on what vessels grow on first.
+        // Guides lie on the first stage.
         let base = self.stages.first().map_or(&self.last, |(first, _)| first);
         let mut stages = Vec::with_capacity(paint.guides.len() + self.stages.len());
         let pace = pace.part(0.5..1.0);
@@ -150,8 +130,8 @@ impl PreparedTissue {
         in_stages(stages, laid(&self.last)?)
     }
 
-    /// How much work it is to lay this paint over the tissue, in items: that of the [paint](TissuePaint::work), and the
-    /// triangles of the mesh where their index has yet to be made.
+    /// Work of laying this paint over the tissue, in items: that of the [paint](TissuePaint::work), and triangles if
+    /// their index has still to be made.
     pub fn painting_work(&self, paint: &TissuePaint) -> usize {
         let is_bare = |canvas: &&Arc<Canvas>| paint.is_on_vertices() && canvas.indexed.get().is_none();
         let triangles = self.canvas.as_ref().filter(is_bare).map_or(0, |canvas| canvas.mesh.triangles().len());

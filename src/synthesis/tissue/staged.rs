@@ -8,20 +8,21 @@ use bevy_math::{
 };
 use std::sync::Arc;
 
-/// Tissues that are in force one after the other.
+/// Tissues in force one after the other.
 ///
-/// Growth asks for the one [in force](trait@Tissue#method.at_step) at each step. Asked as a whole, a staged tissue holds
-/// what any of its stages holds; its extent, its no-go regions and what is drawn from it are those of its last stage, which is the tissue
-/// that goes on and by which settings are fitted.
+/// Growth uses the one [in force](trait@Tissue#method.at_step) at each step. As a whole, a staged tissue contains all
+/// points of its stages. Its extent, its no-go regions and its samples are those of its last stage, which stays in
+/// force and to which settings are fitted.
 #[derive(Clone, Debug)]
 pub struct Staged {
-    /// Each with the last step in which it is in force.
+    /// Each with its last step.
     stages: Vec<(Arc<dyn Tissue>, u32)>,
     last: Arc<dyn Tissue>,
 }
 
 impl Staged {
-    /// Each of `stages` is in force for its number of steps, then `last` for the rest. A stage of 0 steps never is.
+    /// Each of `stages` is in force for its number of steps, then `last` for the rest. A stage of 0 steps is never in
+    /// force.
     ///
     /// # Errors
     /// A tissue among them that is staged itself.
@@ -58,7 +59,7 @@ impl Tissue for Staged {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         let distance = |found: &TissuePoint| found.position.distance_squared(point);
-        // Of equally near ones the first counts, which has the normal of a surface.
+        // Of equally near points, the first with the normal of a surface is used.
         self.all().map(|stage| stage.closest_point(point)).fold(self.last.closest_point(point), |best, found| {
             if distance(&found) < distance(&best) || distance(&found) == distance(&best) && best.normal == Vec3::ZERO {
                 found

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Distance from the surface, relative to the longest side of its box, within which a point counts as on it.
 pub const SURFACE_TOLERANCE: f32 = 1.0e-5;
 
-/// The triangles of a mesh, sampled evenly by area.
+/// The triangles of a mesh, sampled uniformly by area.
 ///
 /// Points are drawn in constant time and projected through an index over the triangles.
 #[derive(Clone, Debug)]
@@ -32,8 +32,8 @@ pub struct MeshSurface {
 impl MeshSurface {
     /// Prepares a mesh.
     ///
-    /// Vertices at the same position share a normal. A closed mesh that faces inwards as a whole is taken as facing
-    /// outwards, so that vessels stand off it on the outside.
+    /// Vertices at the same position share a normal. A closed mesh that faces inwards as a whole is treated as facing
+    /// outwards, so that vessels are lifted off its outside.
     ///
     /// # Errors
     /// None for a [`TriangleMesh`], which is checked; the result type is that of every tissue.
@@ -41,7 +41,7 @@ impl MeshSurface {
         at_once(Self::new_paced(mesh, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -79,12 +79,12 @@ impl MeshSurface {
         self.indexed.index()
     }
 
-    /// The mesh together with that index, to be shared.
+    /// The mesh with its index, for sharing.
     pub fn indexed(&self) -> &IndexedMesh {
         &self.indexed
     }
 
-    /// Unit normal at a point of the mesh: that of the vertices, interpolated; the triangle's own where they cancel out
+    /// Unit normal at a point of the mesh: that of the vertices, interpolated; the triangle's own if those cancel out
     /// or point to its other side.
     pub fn normal_at(&self, point: &SurfacePoint) -> Vec3 {
         let own = self.mesh().triangle_normal(point.triangle) * self.facing;
@@ -99,23 +99,24 @@ impl MeshSurface {
 }
 
 impl MeshSurface {
-    /// Number of parts into which a triangle's sides are cut so that none of them reaches further than `reach`.
+    /// Number of parts into which a triangle's sides are cut so that no small triangle exceeds `reach`.
     fn parts(&self, triangle: usize, reach: f32) -> u32 {
         let [a, b, c] = self.mesh().corners(triangle);
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        // A triangle reaches two thirds of its median from its centre at the most, and that less than this share of a side.
+        // A triangle reaches at most two thirds of its median from its centre, which is less than this share of a side.
         pieces::parts(longest, 1.5 * reach)
     }
 
-    /// The point that four even numbers choose: a slot of the table, whether to stay with it, and two in the triangle.
+    /// The point chosen by four uniform numbers: one for a slot of the table, one for keeping it, and two in the
+    /// triangle.
     fn pick(&self, slot: u32, keep: f32, numbers: [f32; 2]) -> Vec3 {
         self.point_in(self.picks.pick(slot, keep) as usize, numbers)
     }
 
-    /// The point of a triangle that two even numbers choose.
+    /// The point of a triangle chosen by two uniform numbers.
     fn point_in(&self, triangle: usize, [mut v, mut w]: [f32; 2]) -> Vec3 {
         let [a, b, c] = self.mesh().corners(triangle);
-        // Evenly over the parallelogram, its far half folded back.
+        // Uniform over the parallelogram, with its far half folded back.
         if v + w > 1.0 {
             (v, w) = (1.0 - v, 1.0 - w);
         }
@@ -139,7 +140,7 @@ impl Tissue for MeshSurface {
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         match self.index().closest(point) {
             Some(found) => TissuePoint { position: found.position, normal: self.normal_at(&found) },
-            // Only of a point that is not finite there is no closest.
+            // Only a point that is not finite has no closest one.
             None => TissuePoint { position: point, normal: Vec3::ZERO },
         }
     }
@@ -161,7 +162,7 @@ impl Tissue for MeshSurface {
         }
     }
 
-    /// Triangles whose sides are longer than `reach` allows are cut into k² equal ones, by lines along their sides.
+    /// Triangles whose sides are too long for `reach` are cut into k² equal ones, by lines along their sides.
     fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
         for triangle in (0..self.mesh().triangles().len()).filter(|&triangle| !self.mesh().is_degenerate(triangle)) {
             let [a, b, c] = self.mesh().corners(triangle);
@@ -186,9 +187,9 @@ impl Tissue for MeshSurface {
     }
 }
 
-/// Corners of one of the n² equal parts of a triangle, as shares of the ways from its first corner to the others.
+/// Corners of one of the n² equal parts of a triangle, as shares of the edges from its first corner to the others.
 ///
-/// Row by row from the first side: row i has 2(n − i) − 1 parts, by turns upright and upside down.
+/// Row by row from the first side: row i has 2(n − i) − 1 parts, alternately upright and upside down.
 fn small_triangle(part: u32, parts: u32) -> [[f32; 2]; 3] {
     let (mut row, mut left) = (0, part);
     while left >= 2 * (parts - row) - 1 {

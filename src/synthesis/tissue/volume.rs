@@ -1,17 +1,19 @@
 //! The inside of an organ's mesh as a tissue.
 //!
-//! The mesh is voxelised once. Voxels that its surface does not touch are inside or outside as a whole. In the others the
-//! mesh itself is asked: a point is on the same side as the voxel's centre if the triangles between them cancel out; where an
-//! open mesh leaves doubt about the centre, six rays from the point vote. So the boundary is that of the mesh and not that of the voxels.
+//! The mesh is voxelised once. Voxels that its surface does not touch are inside or outside as a whole. In the others
+//! the mesh itself decides: a point is on the same side as the voxel's centre if the triangles between them cancel out.
+//! If an open mesh leaves the centre uncertain, six rays from the point vote. So the boundary is that of the mesh, not
+//! that of the voxels.
 //!
-//! Inside is what the mesh winds around. That forgives duplicated vertices, small holes, overlapping and nested shells and
-//! triangles that face the wrong way.
+//! The inside is where the winding number is not zero. That tolerates duplicated vertices, small holes, overlapping and
+//! nested shells, and triangles that face the wrong way.
 
 use crate::synthesis::{
     mesh::{
         TriangleIndex, TriangleMesh,
         bit_grid::BitGrid,
-        voxels::{Finding, Grid, MAJORITY, crossing},
+        crossing::crossing,
+        voxels::{Finding, Grid, MAJORITY},
         winding::oriented,
     },
     pace::{Pace, SHORT_STRETCH, at_once},
@@ -23,11 +25,11 @@ use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
 use rand::RngExt;
 use std::ops::Range;
 
-/// Steps whose multiples fill the unit cube evenly: powers of 1/g, where g⁴ = g + 1 (Roberts, "The Unreasonable
+/// Steps whose multiples fill the unit cube uniformly: powers of 1/g, where g⁴ = g + 1 (Roberts, "The Unreasonable
 /// Effectiveness of Quasirandom Sequences", 2018).
 const EVEN_STEPS: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
 
-/// What a mesh encloses.
+/// The space that a mesh encloses.
 #[derive(Clone, Debug)]
 pub struct MeshVolume {
     grid: Grid,
@@ -40,11 +42,11 @@ pub struct MeshVolume {
     corners: Vec<[Vec3; 3]>,
     /// Voxels that are inside as a whole.
     inside: BitGrid,
-    /// The same as a list.
+    /// The same voxels as a list.
     whole: Vec<u32>,
     /// Voxels that the surface touches.
     touched: BitGrid,
-    /// What is known of each of these, in order, and one more entry for the end of the last.
+    /// The data of each touched voxel, in order, and one more entry for the end of the last.
     cells: Vec<Cell>,
     /// Triangles in the touched voxels, voxel by voxel.
     triangles: Vec<u32>,
@@ -56,21 +58,21 @@ struct Cell {
     voxel: u32,
     /// Its first triangle.
     first: u32,
-    /// How often its centre is enclosed.
+    /// Winding number of its centre.
     winding: i16,
-    /// Whether that is certain, so that points of the voxel can be compared with it.
+    /// Whether that is certain, so that points of the voxel can be compared with the centre.
     certain: bool,
 }
 
 impl MeshVolume {
-    /// Voxels along the longest side of the mesh's box, if nothing else is asked for.
+    /// Default number of voxels along the longest side of the mesh's box.
     pub const DEFAULT_RESOLUTION: u32 = 128;
 
-    /// Points of the touched voxels by which the volume is measured.
+    /// Points in the touched voxels that measure the volume.
     const PROBES: usize = 1 << 16;
-    /// Most draws for a sample. Of the voxels that are drawn from, more than a tenth of the space is inside.
+    /// Most draws for a sample. More than a tenth of the space of the sampled voxels is inside.
     const TRIES: u32 = 128;
-    /// How far a point that is brought in comes to lie inside, in voxels: the first of these that is inside.
+    /// Depths to which a point is brought inside, in voxels: the first that is inside is used.
     const DEPTHS: [f64; 4] = [0.01, 0.05, 0.2, 0.5];
 
     /// Voxelises a mesh with `resolution` voxels along the longest side of its box.
@@ -79,13 +81,13 @@ impl MeshVolume {
     /// resolution. Holes in the mesh are closed best when they are smaller than the organ is thick.
     ///
     /// # Errors
-    /// [`TissueError::Voxels`] for a resolution
-    /// that cannot be used with this mesh; [`TissueError::NoInside`] for a mesh that encloses nothing.
+    /// [`TissueError::Voxels`] for a resolution that cannot be used with this mesh, [`TissueError::NoInside`] for a
+    /// mesh that encloses nothing.
     pub fn new(mesh: &TriangleMesh, resolution: u32) -> Result<Self, TissueError> {
         at_once(Self::new_paced(mesh, resolution, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -136,7 +138,7 @@ impl MeshVolume {
         self.cells.len() - 1
     }
 
-    /// Volume: whole voxels, and touched ones by the share of their points that are inside.
+    /// Volume: whole voxels, plus touched ones by the share of their points that are inside.
     async fn measure(&self, pace: &Pace) -> f32 {
         let is_inside = |probe: &usize| {
             let slot = probe * self.touched_voxels() / Self::PROBES;
@@ -192,7 +194,7 @@ impl MeshVolume {
         let nearest = self.index.closest(point)?;
         let on = nearest.position.as_dvec3();
         let [a, b, c] = self.corners[nearest.triangle].map(|corner| corner.as_dvec3());
-        // On along the way that was come, and inwards by the triangle; the other way round where that faces wrong.
+        // Further in the same direction, and inwards by the triangle's normal, or outwards if that faces the wrong way.
         let onwards = (on - point.as_dvec3()).normalize_or_zero();
         let inwards = -(b - a).cross(c - a).normalize_or_zero();
         let corner_to_middle = ((a + b + c) / 3.0 - on).normalize_or_zero();
@@ -203,7 +205,7 @@ impl MeshVolume {
         candidates.into_iter().find(|&candidate| self.contains(candidate)).or_else(|| self.nearest_whole(on.as_vec3()))
     }
 
-    /// Centre of the nearest voxel that is inside as a whole: for points near a flap that encloses nothing.
+    /// Centre of the nearest voxel that is inside as a whole, for points near a flap that encloses nothing.
     fn nearest_whole(&self, point: Vec3) -> Option<Vec3> {
         let centers = self.whole.iter().map(|&voxel| self.grid.global(self.grid.corner(voxel as usize) + 0.5));
         centers.min_by(|a, b| a.distance_squared(point).total_cmp(&b.distance_squared(point)))
@@ -220,7 +222,7 @@ impl Tissue for MeshVolume {
     }
 
     fn contains(&self, point: Vec3) -> bool {
-        // In a hole of an open mesh a voxel may be inside as a whole that reaches out of the mesh's box.
+        // In a hole of an open mesh, a voxel that is inside as a whole may extend beyond the mesh's box.
         let [min, max] = [self.bounds.min, self.bounds.max].map(Vec3::from);
         if !(point.cmpge(min).all() && point.cmple(max).all()) {
             return false;
@@ -255,7 +257,7 @@ impl Tissue for MeshVolume {
     }
 }
 
-/// Sorts the pairs of voxel and triangle by voxel. Where a triangle is `loose`, its voxels are not certain.
+/// Sorts the pairs of voxel and triangle by voxel. The voxels of a `loose` triangle are not certain.
 async fn cells(
     touched: &BitGrid,
     touches: &[(u32, u32)],
@@ -274,7 +276,7 @@ async fn cells(
         let (voxel, triangle) = touches[touch];
         let slot = touched.rank(voxel as usize);
         cells[slot].certain &= !loose[triangle as usize];
-        // Counted one entry further on, so that the running sum gives each voxel's beginning.
+        // Counted one entry further, so that the running sum gives each voxel's beginning.
         cells[slot + 1].first += 1;
     };
     pace.part(0.2..0.4).each(touches.len(), count).await;
@@ -305,12 +307,12 @@ fn winding_step(from: Vec3, to: Vec3, corners: [Vec3; 3]) -> i32 {
     if sides[0] != sides[1] || sides[1] != sides[2] {
         return 0;
     }
-    // From the front to the back is on the way in.
+    // From the front to the back is inwards.
     if before { 1 } else { -1 }
 }
 
-/// On which side of a directed edge a line from the origin passes. Computed for one direction of the edge only, so that
-/// its two triangles disagree, and a line between them passes through one.
+/// The side of a directed edge on which a line from the origin passes. It is computed for one direction of the edge
+/// only, so that its two triangles disagree, and a line between them passes through exactly one.
 fn side_of_edge(way: DVec3, from: DVec3, to: DVec3) -> bool {
     if from.to_array() < to.to_array() { way.dot(from.cross(to)) >= 0.0 } else { way.dot(to.cross(from)) < 0.0 }
 }

@@ -1,4 +1,4 @@
-//! Where blood comes over from an artery to a vein.
+//! A link through which blood flows from an artery to a vein.
 
 use super::NodeId;
 
@@ -6,8 +6,8 @@ use super::NodeId;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct BedLink {
-    /// The node that gives blood.
+    /// The node that blood comes from.
     pub arterial: NodeId,
-    /// The node that takes it.
+    /// The node that blood goes to.
     pub venous: NodeId,
 }

@@ -1,7 +1,7 @@
 //! A fingerprint of trees, to tell whether two runs grew the same vessels.
 //!
-//! FNV-1a with 64 bits (Fowler, Noll & Vo): short, and the same on every platform and in every version, which
-//! the standard library's hashers do not promise. It finds differences; it does not withstand forgery.
+//! FNV-1a with 64 bits (Fowler, Noll & Vo): short, and the same on every platform and in every version, which the
+//! standard library's hashers do not promise. It detects differences, but does not protect against forgery.
 
 use super::VesselTree;
 

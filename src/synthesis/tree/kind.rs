@@ -1,10 +1,10 @@
-//! What kind of vessels a tree holds, and one value for each kind.
+//! Kinds of vessels, and one value for each kind.
 
 use std::ops::{Index, IndexMut};
 
-/// What kind of vessels a tree holds.
+/// The kind of vessels in a tree.
 ///
-/// An organ has at most one tree, or forest, of each kind. Which of them it has is up to what makes its vessels: space
+/// An organ has at most one tree, or forest, of each kind. The generator of its vessels decides which: space
 /// colonization grows arteries and veins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
@@ -14,9 +14,9 @@ pub enum VesselKind {
     Artery,
     /// Takes carbon dioxide away.
     Vein,
-    /// Brings blood from another organ's bed, as from the gut to the liver.
+    /// Brings blood from another organ's bed, for example from the gut to the liver.
     PortalVein,
-    /// Carries no blood but what the organ makes, such as bile.
+    /// Carries a product of the organ, such as bile, instead of blood.
     Duct,
 }
 
@@ -56,7 +56,7 @@ impl VesselKind {
         self != Self::Duct
     }
 
-    /// The kind beside which vessels of this kind run: arteries and veins beside each other, the others beside arteries.
+    /// The kind that accompanies this kind: arteries and veins run beside each other, the others beside arteries.
     pub fn companion(self) -> Self {
         if self == Self::Artery { Self::Vein } else { Self::Artery }
     }
@@ -75,18 +75,18 @@ impl VesselKind {
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize), serde(default))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct ByKind<T> {
-    /// That of arteries.
+    /// The value for arteries.
     pub artery: T,
-    /// That of veins.
+    /// The value for veins.
     pub vein: T,
-    /// That of portal veins.
+    /// The value for portal veins.
     pub portal_vein: T,
-    /// That of ducts.
+    /// The value for ducts.
     pub duct: T,
 }
 
 impl<T> ByKind<T> {
-    /// The values that a function gives.
+    /// Values from a function of the kind.
     pub fn from_fn(mut value: impl FnMut(VesselKind) -> T) -> Self {
         Self {
             artery: value(VesselKind::Artery),
@@ -123,7 +123,7 @@ impl<T> ByKind<T> {
         ByKind { artery, vein, portal_vein, duct }
     }
 
-    /// What a function makes of each value.
+    /// Maps each value by a function.
     pub fn map<U>(self, mut change: impl FnMut(VesselKind, T) -> U) -> ByKind<U> {
         ByKind {
             artery: change(VesselKind::Artery, self.artery),

@@ -1,11 +1,12 @@
 //! The vessel tree: three arrays.
 //!
 //! Node `i` and the segment from its parent to it share the index `i`. Nothing that can be derived is stored: tips and
-//! roots, children and branches come from the folds in [`sweep`]. A tree may have several roots, that is, be a forest.
+//! roots, children and branches come from the folds in [`sweep`]. A tree may have several roots and thus be a forest.
 
 use bevy_math::Vec3;
 
 mod bed_links;
+mod error;
 mod hash;
 mod kind;
 pub mod murray;
@@ -15,11 +16,11 @@ pub mod sweep;
 pub mod validate;
 
 pub use bed_links::BedLink;
+pub use error::TreeError;
 pub use hash::hash_trees;
 pub use kind::{ByKind, VesselKind};
 pub use place::Place;
 pub use statistics::TreeStatistics;
-pub use validate::TreeError;
 
 /// A node of a [`VesselTree`], and the segment that ends in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -28,19 +29,19 @@ pub use validate::TreeError;
 pub struct NodeId(pub u32);
 
 impl NodeId {
-    /// Position of the node in the tree's arrays.
+    /// Index of the node in the tree's arrays.
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
-/// What [`VesselTree::parents`] holds for a root.
+/// Value of [`VesselTree::parents`] for a root.
 pub const NO_PARENT: u32 = u32::MAX;
 
 /// A tree, or forest, of vessel segments.
 ///
-/// Positions and radii are in tissue lengths. A parent always stands before its children: `parents[i] < i`, so a
-/// reverse loop runs from the tips to the roots and a forward loop from the roots to the tips.
+/// Positions and radii are in tissue lengths. A parent always comes before its children: `parents[i] < i`. So a reverse
+/// loop goes from the tips to the roots and a forward loop from the roots to the tips.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize), serde(try_from = "TreeArrays"))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
@@ -50,7 +51,7 @@ pub struct VesselTree {
     radii: Vec<f32>,
 }
 
-/// A tree that was read from a file, before it is checked.
+/// A tree read from a file, still unchecked.
 #[cfg(feature = "serialize")]
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -76,7 +77,7 @@ impl VesselTree {
         Self { positions: Vec::new(), parents: Vec::new(), radii: Vec::new() }
     }
 
-    /// A tree of given arrays, checked by [`validate`](Self::validate).
+    /// A tree from arrays, checked by [`validate`](Self::validate).
     ///
     /// All three have one entry per node; a root's parent is [`NO_PARENT`].
     ///
@@ -116,7 +117,7 @@ impl VesselTree {
     /// The parent of a node, `None` for a root.
     ///
     /// # Panics
-    /// When the node is not of this tree.
+    /// If the node is not in this tree.
     pub fn parent(&self, node: NodeId) -> Option<NodeId> {
         let parent = self.parents[node.index()];
         (parent != NO_PARENT).then_some(NodeId(parent))
@@ -145,7 +146,7 @@ impl VesselTree {
         self.push(position, NO_PARENT, radius)
     }
 
-    /// Appends a node with a parent that is already there.
+    /// Appends a node with an existing parent.
     pub(crate) fn push_child(&mut self, parent: NodeId, position: Vec3, radius: f32) -> NodeId {
         debug_assert!(parent.index() < self.len());
         self.push(position, parent.0, radius)

@@ -1,8 +1,8 @@
-//! Murray's law: how radii and angles at a bifurcation hang together.
+//! Murray's law: the relation of radii and angles at a bifurcation.
 //!
 //! Radii follow r_p^κ = r_l^κ + r_r^κ; the angles are those of least vessel volume (Rauch & Harders 2021, Eq. 1, after
-//! Murray 1926). Where a tree grows by many small additions it is cheaper and more exact to keep the *sum* r^κ of a
-//! segment, in units of the terminal radius, than its radius: sums of children simply add up.
+//! Murray 1926). In a tree that grows by many small additions, it is cheaper and more exact to keep the *sum* r^κ of a
+//! segment, in units of the terminal radius, instead of its radius: sums of children simply add up.
 
 use bevy_math::ops;
 
@@ -14,7 +14,7 @@ pub fn parent_radius(left: f32, right: f32, exponent: f32) -> f32 {
     if larger <= 0.0 {
         return 0.0;
     }
-    // By the larger child, so that no power over- or underflows.
+    // Relative to the larger child, so that no power over- or underflows.
     let sum = ops::powf(left / larger, exponent) + ops::powf(right / larger, exponent);
     larger * ops::powf(sum, exponent.recip())
 }
@@ -27,7 +27,7 @@ pub fn bifurcation_angles(left: f32, right: f32, exponent: f32) -> (f32, f32) {
     (daughter_angle(parent, left, right), daughter_angle(parent, right, left))
 }
 
-/// Angle of one daughter of radius `own`, its sister having `other`.
+/// Angle of one daughter of radius `own`, with a sister of radius `other`.
 fn daughter_angle(parent: f32, own: f32, other: f32) -> f32 {
     let square = |radius: f32| (radius / parent) * (radius / parent);
     let (own, other) = (square(own), square(other));
@@ -40,7 +40,7 @@ pub fn symmetric_half_angle(exponent: f32) -> f32 {
     ops::acos(ops::exp2(2.0 / exponent - 1.0).clamp(-1.0, 1.0))
 }
 
-/// Angle, in radians, of a terminal branch beside a child whose r^κ is `sum` times the terminal one's.
+/// Angle, in radians, of a terminal branch beside a child with `sum` times the terminal r^κ.
 ///
 /// This is [`bifurcation_angles`] in terms of the sums that a growing tree keeps.
 pub(crate) fn sprout_angle(sum: f32, exponent: f32) -> f32 {
@@ -69,7 +69,7 @@ mod tests {
         for (exponent, ratio, degrees) in SYMMETRIC {
             assert!((1.0 / parent_radius(1.0, 1.0, exponent) - ratio).abs() < 1e-4);
             let (left, right) = bifurcation_angles(1.0, 1.0, exponent);
-            // acos is steep at 1: at κ = 2 one rounding of the cosine is 0.03°.
+            // acos is steep at 1: at κ = 2 one rounding error of the cosine is 0.03°.
             assert!(
                 ((left + right).to_degrees() - degrees).abs() < 0.1,
                 "κ {exponent}: {}",

@@ -16,17 +16,17 @@ pub struct Place {
 }
 
 impl Place {
-    /// The place at a share of a segment, counted from the root's side.
+    /// The place at a share of a segment, from its end towards the root.
     pub fn new(node: NodeId, along: f32) -> Self {
         Self { node, along }
     }
 }
 
 impl VesselTree {
-    /// Where a place is. A root has no segment: every place on it is the root itself.
+    /// Position of a place. A root has no segment: every place on it is the root itself.
     ///
     /// # Panics
-    /// When the node is not of this tree.
+    /// If the node is not in this tree.
     pub fn position_at(&self, place: Place) -> Vec3 {
         let end = self.positions()[place.node.index()];
         match self.parents()[place.node.index()] {

@@ -1,8 +1,8 @@
 //! Statistics of a tree, as papers on vascular networks report them.
 //!
 //! In: a finished [`VesselTree`]. Out: [`TreeStatistics`], and two measures against the tissue, [`coverage`] and
-//! [`outside`]. Nothing here fails: what is undefined for a tree, such as the angles of one without bifurcations, is
-//! `None`. Lengths are in tissue lengths, sums are taken in f64.
+//! [`outside`]. Nothing here fails: values that are undefined for a tree, such as angles without bifurcations, are
+//! `None`. Lengths are in tissue lengths, sums are computed in f64.
 //!
 //! Sources: orders and their ratios after Horton 1945 and Strahler 1957, on vessels after Jiang, Kassab & Fung,
 //! "Diameter-defined Strahler system and connectivity matrix of the pulmonary arterial tree" (1994), without its
@@ -15,7 +15,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 /// Distribution of a measure over a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summary {
-    /// How many values there are.
+    /// Number of values.
     pub count: usize,
     /// Their arithmetic mean.
     pub mean: f64,
@@ -63,7 +63,7 @@ pub struct TreeStatistics {
     pub nodes: usize,
     /// Number of roots.
     pub roots: usize,
-    /// Number of terminals: segments that nothing follows. A root alone is not one.
+    /// Number of terminals: segments without a following one. A single root is not one.
     pub leaves: usize,
     /// Number of nodes with two children.
     pub bifurcations: usize,
@@ -75,7 +75,7 @@ pub struct TreeStatistics {
     pub volume: f64,
     /// Radius of the thickest root, in tissue lengths.
     pub root_radius: Option<f64>,
-    /// Radii of the leaves, in tissue lengths. They differ where the terminal radius shrinks as the tissue grows.
+    /// Radii of the leaves, in tissue lengths. They differ if the terminal radius shrinks as the tissue grows.
     pub terminal_radius: Option<Summary>,
     /// Angles between the two daughter segments of each bifurcation, in degrees.
     pub bifurcation_angle: Option<Summary>,
@@ -83,7 +83,8 @@ pub struct TreeStatistics {
     pub area_ratio: Option<Summary>,
     /// Asymmetry ratios `r_s / r_l` of each bifurcation: smaller over larger daughter radius.
     pub asymmetry: Option<Summary>,
-    /// Tortuosity of the way to each leaf: its length along the vessels over the straight distance from the root.
+    /// Tortuosity of the path to each leaf: its length along the vessels divided by the straight distance from the
+    /// root.
     pub tortuosity: Option<Summary>,
     /// Streams by Strahler order, from order 1 on. Empty without segments.
     pub strahler: Vec<StrahlerOrder>,
@@ -93,7 +94,7 @@ pub struct TreeStatistics {
     pub length_ratio: Option<f64>,
     /// Diameter ratio `R_D`: 10 to the slope of log₁₀ of the mean stream diameter over k. Needs two orders.
     pub diameter_ratio: Option<f64>,
-    /// Mean diameter of the branches by the number of splits between them and their root, in tissue lengths. A branch
+    /// Mean diameter of the branches, in tissue lengths, by the number of splits between them and their root. A branch
     /// counts once, with its mean diameter along its length.
     pub diameters_by_level: Vec<f64>,
 }
@@ -159,7 +160,7 @@ impl VesselTree {
     }
 }
 
-/// What is measured at nodes with two children.
+/// Measures at nodes with two children.
 struct Bifurcations {
     count: usize,
     larger: usize,
@@ -194,13 +195,13 @@ impl Bifurcations {
     }
 }
 
-/// Angle between two vectors in degrees, exact for small and for straight angles too; `None` where one has no length.
+/// Angle between two vectors in degrees, accurate for small and for straight angles, too; `None` if one has no length.
 fn angle_degrees(a: Vec3, b: Vec3) -> Option<f64> {
     let (a, b) = (a.try_normalize()?, b.try_normalize()?);
     Some(f64::from(2.0 * ops::atan2((a - b).length(), (a + b).length())).to_degrees())
 }
 
-/// Length and mean diameter of a run of segments, summed up segment by segment.
+/// Length and mean diameter of a run of segments, summed segment by segment.
 #[derive(Clone, Copy, Default)]
 struct Run {
     length: f64,
@@ -219,7 +220,7 @@ impl Run {
         self.segments += 1.0;
     }
 
-    /// Mean along the length; over the segments where they have no length.
+    /// Mean along the length, or over the segments if they have no length.
     fn mean_diameter(&self) -> f64 {
         if self.length > 0.0 { self.weighted_diameter / self.length } else { self.diameter / self.segments }
     }
@@ -230,7 +231,7 @@ fn strahler(tree: &VesselTree) -> Vec<StrahlerOrder> {
     let mut stream_of = vec![usize::MAX; tree.len()];
     let mut streams: Vec<(u32, Run)> = Vec::new();
     for (node, parent) in tree.segments() {
-        // A root ends no segment, so it has no stream that could go on.
+        // A root is the end of no segment, so it has no stream to continue.
         let continues = stream_of[parent] != usize::MAX && orders[parent] == orders[node];
         stream_of[node] = if continues { stream_of[parent] } else { streams.len() };
         if !continues {
@@ -301,8 +302,8 @@ fn diameters_by_level(tree: &VesselTree) -> Vec<f64> {
 
 /// Share, between 0 and 1, of sample points that lie within `distance` of a node, itself included.
 ///
-/// With samples spread over the tissue and the final birth distance, it is the share of the tissue that the vessels
-/// supply. Sample points that are not finite count as not covered. `None` without samples.
+/// With samples spread over the tissue and the final birth distance, it is the share of the tissue supplied by the
+/// vessels. Sample points that are not finite count as uncovered. `None` without samples.
 pub fn coverage(tree: &VesselTree, samples: &[Vec3], distance: f32) -> Option<f32> {
     if samples.is_empty() {
         return None;
@@ -311,7 +312,7 @@ pub fn coverage(tree: &VesselTree, samples: &[Vec3], distance: f32) -> Option<f3
         return Some(0.0);
     }
     let nodes: Vec<[f32; 3]> = tree.positions().iter().map(Vec3::to_array).collect();
-    // Fails only on more nodes than a u32 counts, which no tree holds.
+    // Fails only for more nodes than a u32 can count, which no tree has.
     let index = ImmutableKdTree::<f32, 3>::new_from_slice(&nodes).ok()?;
     let is_covered = |sample: &&Vec3| {
         sample.is_finite() && {
@@ -323,7 +324,7 @@ pub fn coverage(tree: &VesselTree, samples: &[Vec3], distance: f32) -> Option<f3
     Some(samples.iter().filter(is_covered).count() as f32 / samples.len() as f32)
 }
 
-/// Number of nodes for which `contains` is false: with a tissue's own test, of those that left it.
+/// Number of nodes for which `contains` is false: with a tissue's test, those outside it.
 pub fn outside(tree: &VesselTree, contains: impl Fn(Vec3) -> bool) -> usize {
     tree.positions().iter().filter(|&&position| !contains(position)).count()
 }

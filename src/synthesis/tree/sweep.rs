@@ -1,9 +1,9 @@
-//! What is derived from the three arrays: children, tips, depth, path length, Strahler order, branches.
+//! Data derived from the three arrays: children, tips, depth, path length, Strahler order, branches.
 //!
-//! In: a [`VesselTree`], whose parents stand before their children. Out: arrays with one entry per node or per branch.
+//! In: a [`VesselTree`], with parents before their children. Out: arrays with one entry per node or per branch.
 //! Everything here is one or two loops over the nodes, in O(n): a reverse loop passes values from the tips to the roots
-//! ([`VesselTree::fold_to_roots`]), a forward loop from the roots to the tips ([`VesselTree::fold_to_tips`]). No
-//! recursion, so a vessel of a million nodes in a row is as good as any other.
+//! ([`VesselTree::fold_to_roots`]), a forward loop from the roots to the tips ([`VesselTree::fold_to_tips`]). There is
+//! no recursion, so a vessel of a million nodes in a row is no problem.
 
 use super::{NO_PARENT, VesselTree};
 
@@ -14,7 +14,7 @@ impl VesselTree {
     /// their index, each after all of its own children.
     ///
     /// # Panics
-    /// When `values` does not have one entry per node.
+    /// If `values` does not have one entry per node.
     pub fn fold_to_roots<T>(&self, values: &mut [T], mut merge: impl FnMut(&mut T, &T)) {
         assert_eq!(values.len(), self.len(), "one value per node");
         for (node, &parent) in self.parents().iter().enumerate().rev() {
@@ -31,7 +31,7 @@ impl VesselTree {
     /// node, each after its parent, and gets the parent's value and its own.
     ///
     /// # Panics
-    /// When `values` does not have one entry per node.
+    /// If `values` does not have one entry per node.
     pub fn fold_to_tips<T>(&self, values: &mut [T], mut step: impl FnMut(usize, &T, &mut T)) {
         assert_eq!(values.len(), self.len(), "one value per node");
         for (node, parent) in self.segments() {
@@ -69,8 +69,8 @@ impl VesselTree {
         depths
     }
 
-    /// Number of splits (nodes with two or more children) between every segment and its root, by the node that the
-    /// segment ends in. The root itself does not count: what leaves it has level 0.
+    /// Number of splits (nodes with two or more children) between every segment and its root, by the segment's end
+    /// node. The root itself does not count: segments that leave it have level 0.
     pub fn bifurcation_levels(&self) -> Vec<u32> {
         let counts = self.child_counts();
         let mut levels = vec![0; self.len()];
@@ -81,9 +81,9 @@ impl VesselTree {
         levels
     }
 
-    /// Length of the way along the vessel from the root to every node, in tissue lengths.
+    /// Length along the vessel from the root to every node, in tissue lengths.
     ///
-    /// Summed in f64, so that a long vessel of short segments keeps its digits.
+    /// Summed in f64, so that a long vessel of short segments keeps its accuracy.
     pub fn path_lengths(&self) -> Vec<f64> {
         let mut lengths = vec![0.0; self.len()];
         self.fold_to_tips(&mut lengths, |node, parent, child| *child = parent + self.segment_length(node));
@@ -93,7 +93,7 @@ impl VesselTree {
     /// Length of the segment that ends in a node, in tissue lengths; 0 for a root.
     ///
     /// # Panics
-    /// When the node is not of this tree.
+    /// If the node is not in this tree.
     pub fn segment_length(&self, node: usize) -> f64 {
         f64::from(self.segment_vector(node).length())
     }
@@ -107,12 +107,12 @@ impl VesselTree {
 
     /// Strahler order of every node, and so of the segment that ends in it.
     ///
-    /// A tip has order 1. Where the highest order k among the children occurs once, the node has order k; where it
-    /// occurs twice or more, k + 1.
+    /// A tip has order 1. If the highest order k among the children occurs once, the node has order k; if it occurs
+    /// twice or more, k + 1.
     ///
     /// Source: Strahler, "Quantitative analysis of watershed geomorphology" (1957).
     pub fn strahler_orders(&self) -> Vec<u32> {
-        // Highest order among the children, and how many of them have it.
+        // Highest order among the children, and its number of occurrences.
         let mut highest = vec![(0u32, 0u32); self.len()];
         let order = |(highest, count): (u32, u32)| if count == 1 { highest } else { highest + 1 };
         self.fold_to_roots(&mut highest, |parent, &child| {
@@ -132,7 +132,8 @@ impl VesselTree {
     }
 }
 
-/// Children of every node, as compressed rows: one array of all children and one of where each node's begin.
+/// Children of every node, as compressed rows: one array of all children and one with the start of each node's
+/// children.
 ///
 /// Keeps its memory from one [`rebuild`](Self::rebuild) to the next.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -142,7 +143,7 @@ pub struct Children {
 }
 
 impl Children {
-    /// Fills the table from a tree and forgets what it held.
+    /// Fills the table from a tree, replacing its old contents.
     pub fn rebuild(&mut self, tree: &VesselTree) {
         self.starts.clear();
         self.starts.resize(tree.len() + 1, 0);
@@ -169,17 +170,17 @@ impl Children {
     /// Children of a node in rising order; empty for a tip.
     ///
     /// # Panics
-    /// When the node is not of the tree.
+    /// If the node is not in the tree.
     pub fn of(&self, node: usize) -> &[u32] {
         &self.nodes[self.starts[node] as usize..self.starts[node + 1] as usize]
     }
 
-    /// Number of nodes the table was made for.
+    /// Number of nodes of the table's tree.
     pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Whether the table was made for no nodes.
+    /// Whether the table's tree has no nodes.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -187,8 +188,8 @@ impl Children {
 
 /// The branches of a tree: runs of segments from a root or split to the next split or tip.
 ///
-/// A split is a node with two or more children. Every segment is of exactly one branch; a root without children has
-/// none. Branches are in the order of their first segment, so a branch's parent branch stands before it.
+/// A split is a node with two or more children. Every segment belongs to exactly one branch; a root without children
+/// has none. Branches are in the order of their first segment, so a parent branch comes before its children.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Branches {
     starts: Vec<u32>,
@@ -198,13 +199,13 @@ pub struct Branches {
 }
 
 impl Branches {
-    /// What [`parent`](Self::parent) and [`of_nodes`](Self::of_nodes) hold where there is no branch.
+    /// Value of [`parent`](Self::parent) and [`of_nodes`](Self::of_nodes) for no branch.
     const NONE: u32 = u32::MAX;
 
     fn of(tree: &VesselTree) -> Self {
         let counts = tree.child_counts();
         let mut branches = Self { of_nodes: vec![Self::NONE; tree.len()], ..Self::default() };
-        // Lengths first: every branch holds the node that it starts from.
+        // Lengths first: every branch includes its start node.
         for (node, parent) in tree.segments() {
             let before = branches.of_nodes[parent];
             if before == Self::NONE || counts[parent] > 1 {
@@ -250,10 +251,10 @@ impl Branches {
         self.parents.is_empty()
     }
 
-    /// Nodes of a branch along the vessel: the root or split that it starts from, then one for each of its segments.
+    /// Nodes of a branch along the vessel: its start (a root or split), then one for each of its segments.
     ///
     /// # Panics
-    /// When there are not that many branches.
+    /// If there are not that many branches.
     pub fn nodes(&self, branch: usize) -> &[u32] {
         &self.nodes[self.starts[branch] as usize..self.starts[branch + 1] as usize]
     }
@@ -263,10 +264,10 @@ impl Branches {
         (0..self.len()).map(|branch| self.nodes(branch))
     }
 
-    /// The branch that a branch leaves; `None` for one that begins at a root.
+    /// The parent branch of a branch; `None` for one that begins at a root.
     ///
     /// # Panics
-    /// When there are not that many branches.
+    /// If there are not that many branches.
     pub fn parent(&self, branch: usize) -> Option<usize> {
         let parent = self.parents[branch];
         (parent != Self::NONE).then_some(parent as usize)
@@ -281,7 +282,7 @@ impl Branches {
     /// [`VesselTree::strahler_orders`] of the same tree.
     ///
     /// # Panics
-    /// When the orders are of another tree with fewer nodes.
+    /// If the orders are those of a tree with fewer nodes.
     pub fn strahler_orders(&self, node_orders: &[u32]) -> Vec<u32> {
         self.iter().map(|nodes| node_orders[nodes[1] as usize]).collect()
     }

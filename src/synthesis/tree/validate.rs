@@ -1,59 +1,16 @@
-//! Whether a tree is well formed, and how far it is from Murray's law.
+//! Checks whether a tree is well formed, and how much it deviates from Murray's law.
+
+pub use super::error::TreeError;
 
 use super::{NO_PARENT, VesselTree};
-use bevy_math::{Vec3, ops};
-
-/// What is wrong with the arrays of a tree.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum TreeError {
-    /// The arrays are not of one length.
-    #[error("a tree of {positions} positions has {parents} parents and {radii} radii; give one of each per node")]
-    Lengths {
-        /// Number of positions.
-        positions: usize,
-        /// Number of parents.
-        parents: usize,
-        /// Number of radii.
-        radii: usize,
-    },
-    /// More nodes than an index can count.
-    #[error("a tree of {nodes} nodes is too large; split it into trees of fewer than 2^32 nodes")]
-    TooManyNodes {
-        /// Number of nodes.
-        nodes: usize,
-    },
-    /// A parent that does not stand before its child.
-    #[error("node {node} has parent {parent}; sort the nodes so that every parent stands before its children")]
-    ParentNotBefore {
-        /// The child.
-        node: usize,
-        /// Its parent.
-        parent: u32,
-    },
-    /// A position that is infinite or not a number.
-    #[error("node {node} lies at {position}; every coordinate must be a finite number")]
-    Position {
-        /// The node.
-        node: usize,
-        /// Where it lies.
-        position: Vec3,
-    },
-    /// A radius that is zero, negative, infinite or not a number.
-    #[error("node {node} has radius {radius}; every radius must be finite and above 0")]
-    Radius {
-        /// The node.
-        node: usize,
-        /// Its radius.
-        radius: f32,
-    },
-}
+use bevy_math::ops;
 
 impl VesselTree {
-    /// Checks every invariant of a tree: arrays of one length, parents before children, finite positions, finite radii
-    /// above zero. An empty tree and a forest are well formed.
+    /// Checks every invariant of a tree: arrays of equal length, parents before children, finite positions, finite
+    /// radii above zero. An empty tree and a forest are well formed.
     ///
     /// # Errors
-    /// The first invariant that is broken, with the node and the value.
+    /// The first broken invariant, with the node and the value.
     pub fn validate(&self) -> Result<(), TreeError> {
         let (positions, parents, radii) = (self.positions().len(), self.parents().len(), self.radii().len());
         if positions != parents || positions != radii {
@@ -81,7 +38,7 @@ impl VesselTree {
     /// The largest relative error of Murray's law over all nodes with children: `|r_p^κ − Σ r_c^κ| / r_p^κ`, where p is
     /// the node, c its children and κ the `exponent`. 0 for a tree in which no node has children.
     ///
-    /// The terms are taken as `(r_c / r_p)^κ`, so that κ = 3 of a small radius does not underflow, and summed in f64.
+    /// The terms are computed as `(r_c / r_p)^κ`, so that small radii do not underflow for κ = 3, and summed in f64.
     ///
     /// Source: Murray, "The physiological principle of minimum work" (1926), in the general form of Rauch & Harders 2021,
     /// section 2.

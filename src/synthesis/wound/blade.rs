@@ -1,20 +1,20 @@
-//! What cuts: blade shapes, checked once, and how they are brought into the space of an organ.
+//! Blades: shapes that cut, checked once, and their transforms into the space of an organ.
 //!
-//! Two kinds. A **surface** (rectangle, disc, swept edge, triangles) severs a vessel where its centre line passes through.
-//! A **volume** (ball, capsule) takes out all that lies within, and severs what passes its boundary.
+//! Two kinds. A **surface** (rectangle, disc, swept edge, triangles) severs a vessel where its centre line passes
+//! through. A **volume** (ball, capsule) removes all that lies inside, and severs what passes its boundary.
 //!
-//! A blade comes in the space of the caller, mostly the world. [`Blade::to_local`] brings it into an organ's space, where
-//! the vessels are. Triangles go over corner by corner. Curved shapes keep the map from the new space back to the one
-//! they were given in and are asked there, so a ball stays a ball of the world under non-uniform scale, mirrors and
-//! shears.
+//! A blade is given in the space of the caller, usually the world. [`Blade::to_local`] transforms it into an organ's
+//! space, where the vessels are. Triangles are transformed corner by corner. Curved shapes keep the map from the new
+//! space back to the original one and are evaluated there, so a ball stays a ball of the world under non-uniform scale,
+//! mirrors and shears.
 
 use crate::synthesis::segment_index::{Region, axes};
 use bevy_math::{Affine3A, DAffine3, DMat3, DVec3, Vec3};
 
-/// Why a blade cannot cut.
+/// The reason why a blade cannot cut.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BladeError {
-    /// A coordinate or size that is infinite or not a number.
+    /// A coordinate or size that is infinite or NaN.
     #[error("{what} of the blade is {value}; it must be a finite number")]
     NotFinite {
         /// Which one.
@@ -44,7 +44,7 @@ pub enum BladeError {
     /// A disc whose plane is not given.
     #[error("the normal of the disc has no length; give the direction in which it faces")]
     NoNormal,
-    /// A transform that flattens space, or is no number.
+    /// A transform that flattens space, or holds NaN.
     #[error(
         "the organ's transform has determinant {determinant}; it must be finite and not 0: give every axis a scale"
     )]
@@ -59,8 +59,8 @@ pub enum BladeError {
 
 /// A shape that cuts.
 ///
-/// A surface blade owns its edges and corners: a centre line that passes exactly through one is severed, once, however
-/// many triangles meet there.
+/// A surface blade includes its edges and corners: a centre line that passes exactly through one is severed once,
+/// however many triangles meet there.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct Blade {
@@ -75,7 +75,7 @@ pub(super) enum Shape {
     Volume(Volume),
 }
 
-/// The maps between the present space and the one that a shape was given in.
+/// The maps between the present space and a shape's original one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Frame {
     /// From the present space to the shape's.
@@ -88,13 +88,13 @@ pub(super) struct Frame {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Disc {
     pub center: DVec3,
-    /// Of length 1.
+    /// Unit vector.
     pub normal: DVec3,
     pub radius: f64,
     pub frame: Frame,
 }
 
-/// All within a distance of a line; of a point, where both ends are one.
+/// All points within a distance of a line, or of a point if both ends coincide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Volume {
     pub from: DVec3,
@@ -104,7 +104,7 @@ pub(super) struct Volume {
 }
 
 impl Blade {
-    /// A flat rectangle: its centre, and from there to the middles of two neighbouring sides.
+    /// A flat rectangle, given by its centre and the vectors from there to the middles of two neighbouring sides.
     ///
     /// Vectors that are not perpendicular make a parallelogram. Units: those of the caller's space.
     ///
@@ -128,12 +128,11 @@ impl Blade {
         Ok(Self { shape: Shape::Disc(disc) })
     }
 
-    /// The way of a straight edge between two frames, such as a scalpel's: from where its two ends were to where they
-    /// are.
+    /// The path of a straight edge between two frames, such as a scalpel's, given by its two ends before and after.
     ///
-    /// The way is two triangles that share the diagonal from the first end before to the second end after; where the edge
-    /// also turned, they are what passes for its curved way. Sweeps of successive frames share their edges exactly, so
-    /// nothing slips through between them. An edge that turns about one of its ends sweeps one triangle.
+    /// The path is two triangles that share the diagonal from the first end before to the second end after; if the edge
+    /// also turned, they approximate its curved path. Sweeps of successive frames share their edges exactly, so nothing
+    /// slips through between them. An edge that turns about one of its ends sweeps one triangle.
     ///
     /// # Errors
     /// A coordinate that is not finite; an edge without length, or one that has not moved sideways.
@@ -145,7 +144,7 @@ impl Blade {
     /// nothing.
     ///
     /// # Errors
-    /// No triangle; a coordinate that is not finite; not one triangle with an area.
+    /// No triangle; a coordinate that is not finite; no triangle with an area.
     pub fn triangles(triangles: Vec<[Vec3; 3]>) -> Result<Self, BladeError> {
         if triangles.is_empty() {
             return Err(BladeError::NoTriangles);
@@ -159,7 +158,7 @@ impl Blade {
         Ok(Self { shape: Shape::Triangles(triangles) })
     }
 
-    /// All within `radius` of a point: the tip of an ultrasonic or bipolar instrument.
+    /// All points within `radius` of a point, such as the tip of an ultrasonic or bipolar instrument.
     ///
     /// # Errors
     /// A number that is not finite, a radius that is not above 0.
@@ -167,7 +166,7 @@ impl Blade {
         Self::capsule(center, center, radius)
     }
 
-    /// All within `radius` of a line, such as the jaws of an instrument or the way of its tip in a frame.
+    /// All points within `radius` of a line, such as the jaws of an instrument or the path of its tip in a frame.
     ///
     /// # Errors
     /// A number that is not finite, a radius that is not above 0.
@@ -179,15 +178,15 @@ impl Blade {
         Ok(Self { shape: Shape::Volume(volume) })
     }
 
-    /// Whether the blade takes out what lies within it.
+    /// Whether the blade removes what lies within it.
     pub fn is_volume(&self) -> bool {
         matches!(self.shape, Shape::Volume(_))
     }
 
-    /// The same blade in the space of an organ, whose transform leads from there to the blade's space.
+    /// The same blade in the space of an organ, given the transform from there to the blade's space.
     ///
-    /// Mirrors, non-uniform scale and shear are fine. Corners are mapped in f64 and rounded to f32, each by itself, so
-    /// triangles that share one still do.
+    /// Mirrors, non-uniform scale and shear are allowed. Corners are mapped in f64 and rounded to f32, each by itself,
+    /// so triangles still share their corners exactly.
     ///
     /// # Errors
     /// A transform without inverse; corners so far away in the organ's space that they are not finite there.
@@ -210,7 +209,7 @@ impl Blade {
 
     /// Calls `visit(region, part)` for parts that make up the blade.
     ///
-    /// Triangles come in pairs, so that what asks an index for each part asks once for a swept edge.
+    /// Triangles come in pairs, so that a swept edge needs only one index query.
     pub(super) fn parts(&self, mut visit: impl FnMut(&Region, Part)) {
         match &self.shape {
             Shape::Triangles(triangles) => {
@@ -237,7 +236,7 @@ fn region_of(triangles: &[[Vec3; 3]]) -> Region {
     })
 }
 
-/// What one question to an index serves.
+/// A part of a blade for one index query.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Part<'a> {
     Triangles(&'a [[Vec3; 3]]),
@@ -248,7 +247,7 @@ pub(super) enum Part<'a> {
 impl Frame {
     const IDENTITY: Self = Self { inward: DAffine3::IDENTITY, outward: DAffine3::IDENTITY };
 
-    /// The frame of a shape that is given in the space to which a transform leads.
+    /// The frame of a shape that is given in the target space of a transform.
     fn new(local_to_world: &Affine3A) -> Result<Self, BladeError> {
         let axes = &local_to_world.matrix3;
         let matrix3 = DMat3::from_cols(axes.x_axis.as_dvec3(), axes.y_axis.as_dvec3(), axes.z_axis.as_dvec3());
@@ -261,19 +260,19 @@ impl Frame {
         Ok(Self { inward, outward })
     }
 
-    /// This frame, seen from one space further out.
+    /// This frame, combined with a further one.
     fn after(&self, next: &Self) -> Self {
         Self { inward: self.inward * next.inward, outward: next.outward * self.outward }
     }
 
-    /// How far, along an axis of the present space, a ball of the shape's space extends. `flat`: the normal of a disc
+    /// Extent of a ball of the shape's space along an axis of the present space. `flat` is the normal of a disc
     /// instead.
     fn reach(&self, center: DVec3, radius: f64, flat: DVec3, axis: DVec3) -> [f64; 2] {
         let row = self.outward.matrix3.transpose() * axis;
         let along = row.dot(flat);
         let half = radius * (row.length_squared() - along * along).max(0.0).sqrt();
         let center = self.outward.transform_point3(center);
-        // More than the rounding of what led here.
+        // More than the rounding so far.
         let half = half + ROUNDING * (half + (center.abs() + self.outward.translation.abs()).dot(axis.abs()));
         let center = center.dot(axis);
         [center - half, center + half]
@@ -286,7 +285,7 @@ const ROUNDING: f64 = 1e-12;
 impl Disc {
     fn region(&self) -> Region {
         let Self { center, normal, radius, frame } = self;
-        // Normals go the way of planes.
+        // Normals transform like planes.
         let plane = frame.inward.matrix3.transpose() * *normal;
         Region::of(axes(plane, plane.any_orthogonal_vector()), |axis| frame.reach(*center, *radius, *normal, axis))
     }

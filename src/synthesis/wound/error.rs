@@ -1,16 +1,16 @@
-//! Why something could not be done to a vessel.
+//! Errors of actions on vessels.
 
 use super::{BladeError, ClampId};
 use crate::synthesis::tree::Place;
 
-/// Why an action on the vessels was turned down. Nothing has changed then.
+/// The reason why an action on the vessels was refused. Nothing has changed then.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WoundError {
     /// The blade cannot be used.
     #[error(transparent)]
     Blade(#[from] BladeError),
     /// A node that the tree doesn't have.
-    #[error("node {node} is not of this tree of {nodes} nodes; take places from the tree that is operated on")]
+    #[error("node {node} is not in this tree of {nodes} nodes; take places from the tree that is operated on")]
     NoSuchNode {
         /// The node.
         node: u32,
@@ -18,7 +18,7 @@ pub enum WoundError {
         nodes: usize,
     },
     /// A place on a root.
-    #[error("node {node} is a root, which no vessel leads to; take a place on a segment that leaves it")]
+    #[error("node {node} is a root, which is the end of no segment; take a place on a segment that leaves it")]
     OnRoot {
         /// The node.
         node: u32,
@@ -49,7 +49,7 @@ pub enum WoundError {
         /// The value found.
         calibre: f32,
     },
-    /// A ledger in a file that says what no action could have done.
+    /// A ledger in a file with contents that no action can produce.
     #[error("the ledger of wounds is broken at node {node}: {what}; save it again, or leave it out")]
     BrokenLedger {
         /// The node.

@@ -1,10 +1,10 @@
-//! What has happened to one segment: gaps in it, and what holds it shut.
+//! The injury of one segment: its gaps and closures.
 //!
-//! Gaps lie in order along the segment and don't overlap; between them are its pieces, as many as gaps and one more,
-//! some of them without length. A clamp, tie or seal lies on a piece. One on the very tip of a piece belongs to that
-//! piece; where two tips touch, to the one towards the root.
+//! Gaps are in order along the segment and don't overlap. Between them are its pieces, one more than gaps, some of them
+//! without length. A clamp, tie or seal lies on a piece. One exactly at the tip of a piece belongs to that piece; if
+//! two tips touch, to the one towards the root.
 //!
-//! How far a gap reaches is decided where the whole tree is seen: see `withdrawal`.
+//! The extent of a gap is decided where the whole tree is known: see `withdrawal`.
 
 use crate::synthesis::haemodynamics::EndSide;
 
@@ -13,7 +13,7 @@ use crate::synthesis::haemodynamics::EndSide;
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Tip {
     pub end: u32,
-    /// Whether the lumen is closed for good.
+    /// Whether the lumen is permanently closed.
     pub sealed: bool,
 }
 
@@ -23,18 +23,18 @@ pub(super) struct Tip {
 pub(super) struct Gap {
     pub from: f32,
     pub to: f32,
-    /// The end that the vessel has at `from`; `None` where what lay before it is gone with its parent's node.
+    /// The vessel's end at `from`; `None` if the part before it is gone, including the parent's node.
     pub proximal: Option<Tip>,
-    /// The end at `to`; `None` where what lay behind it is gone with the segment's own node.
+    /// The end at `to`; `None` if the part behind it is gone, including the segment's own node.
     pub distal: Option<Tip>,
 }
 
 impl Gap {
-    /// A segment that is gone altogether.
+    /// The gap of a wholly removed segment.
     pub const WHOLE: Self = Self { from: 0.0, to: 1.0, proximal: None, distal: None };
 }
 
-/// What closes the lumen.
+/// The kind of a closure of the lumen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum ClosureKind {
@@ -45,7 +45,7 @@ pub(super) enum ClosureKind {
     Seal,
 }
 
-/// A stretch of a piece that carries no blood; without length but for seals.
+/// A stretch of a piece that carries no blood. Only seals have a length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Closure {
@@ -54,19 +54,19 @@ pub(super) struct Closure {
     pub kind: ClosureKind,
 }
 
-/// An end as it lies on its segment.
+/// An end on its segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
     /// Its index in the ledger.
     pub index: u32,
     pub side: EndSide,
-    /// Share of the segment at which its tip is.
+    /// Share of the segment at its tip.
     pub along: f32,
-    /// Whether it is not sealed, and nothing closes the piece that it ends.
+    /// Whether it is not sealed, and nothing closes its piece.
     pub is_open: bool,
 }
 
-/// All that has happened to a segment.
+/// All gaps and closures of a segment.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Injury {
@@ -75,10 +75,10 @@ pub(super) struct Injury {
     closures: Vec<Closure>,
 }
 
-/// That of a segment to which nothing was done.
+/// The empty injury of a whole segment.
 pub(super) static NO_INJURY: Injury = Injury { gaps: Vec::new(), closures: Vec::new() };
 
-/// A stretch that a volume takes out, as [`Severed`](super::Severed).
+/// A stretch that a volume removes, as in [`Severed`](super::Severed).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Removal {
     pub from: f32,
@@ -88,7 +88,7 @@ pub(super) struct Removal {
 }
 
 impl Injury {
-    /// Whether the vessel is neither severed nor held shut.
+    /// Whether the vessel is neither severed nor closed.
     pub fn is_empty(&self) -> bool {
         self.gaps.is_empty() && self.closures.is_empty()
     }
@@ -101,13 +101,13 @@ impl Injury {
         &self.closures
     }
 
-    /// The piece before gap `index`; behind the last for their number.
+    /// The piece before gap `index`; the one behind the last gap for the number of gaps.
     pub fn piece(&self, index: usize) -> [f32; 2] {
         let from = index.checked_sub(1).map_or(0.0, |before| self.gaps[before].to);
         [from, self.gaps.get(index).map_or(1.0, |gap| gap.from)]
     }
 
-    /// All pieces, those without length too.
+    /// All pieces, including those without length.
     pub fn pieces(&self) -> impl Iterator<Item = [f32; 2]> + '_ {
         (0..=self.gaps.len()).map(|index| self.piece(index))
     }
@@ -118,12 +118,12 @@ impl Injury {
         self.gaps.partition_point(|gap| middle > f64::from(gap.from))
     }
 
-    /// What closes a piece.
+    /// The closures of a piece.
     fn closures_of(&self, piece: usize) -> impl Iterator<Item = &Closure> {
         self.closures.iter().filter(move |closure| self.piece_of(closure) == piece)
     }
 
-    /// The gap in which a share lies, its ends included.
+    /// The gap that contains a share, its ends included.
     pub fn gap_at(&self, share: f32) -> Option<&Gap> {
         self.gaps.iter().find(|gap| gap.from <= share && share <= gap.to)
     }
@@ -135,8 +135,8 @@ impl Injury {
         self.gaps.insert(at, gap);
     }
 
-    /// Takes a stretch out, and leaves a gap that holds it. Ends within that are gone. Returns whether it took out
-    /// anything that was still there.
+    /// Removes a stretch, and leaves a gap that contains it. Ends within that are removed. Returns whether it removed
+    /// anything that still existed.
     pub fn take_out(&mut self, removal: Removal, gap: Gap) -> bool {
         if self.gaps.contains(&gap) {
             return false;
@@ -151,12 +151,12 @@ impl Injury {
         true
     }
 
-    /// Whether an end that looks towards the tips would be sealed at a share.
+    /// Whether an end that faces the tips would be sealed at a share.
     pub fn is_sealed_below(&self, share: f32) -> bool {
         self.seals().any(|seal| seal.from < share && share <= seal.to)
     }
 
-    /// Whether an end that looks towards the root would be sealed at a share.
+    /// Whether an end that faces the root would be sealed at a share.
     pub fn is_sealed_above(&self, share: f32) -> bool {
         self.seals().any(|seal| seal.from <= share && share < seal.to)
     }
@@ -165,25 +165,25 @@ impl Injury {
         self.closures.iter().filter(|closure| closure.kind == ClosureKind::Seal)
     }
 
-    /// What holds an end that draws back towards the root from `share`: a gap, a clamp or a tie. `None` where it may go
-    /// on to the parent.
+    /// The share of the gap, clamp or tie that holds an end that retracts from `share` towards the root. `None` if it
+    /// may continue to the parent.
     pub fn hold_below(&self, share: f32) -> Option<f32> {
         let holds = self.gaps.iter().map(|gap| gap.to).chain(self.clamped());
         holds.filter(|&hold| hold <= share).reduce(f32::max)
     }
 
-    /// What holds an end that draws back towards the node. A clamp at `share` itself stays with the other end.
+    /// The same for an end that retracts towards the node. A clamp at `share` itself stays with the other end.
     pub fn hold_above(&self, share: f32) -> Option<f32> {
         let holds = self.gaps.iter().map(|gap| gap.from).chain(self.clamped());
         holds.filter(|&hold| hold > share).reduce(f32::min)
     }
 
-    /// Where clamps and ties are.
+    /// Shares of clamps and ties.
     fn clamped(&self) -> impl Iterator<Item = f32> {
         self.closures.iter().filter(|closure| closure.kind != ClosureKind::Seal).map(|closure| closure.from)
     }
 
-    /// Takes away what closes a stretch that is there no longer. Seals that reach beyond it keep the rest.
+    /// Removes closures in a removed stretch. Seals that extend beyond it keep the rest.
     fn clear_closures(&mut self, from: f32, to: f32) {
         let mut rest = Vec::new();
         self.closures.retain_mut(|closure| {
@@ -211,7 +211,7 @@ impl Injury {
         from < to && from <= along && along <= to
     }
 
-    /// Puts a clamp or a tie where there is a vessel.
+    /// Puts a clamp or a tie on existing vessel.
     pub fn close(&mut self, along: f32, kind: ClosureKind) {
         let at = self.closures.partition_point(|other| other.from <= along);
         self.closures.insert(at, Closure { from: along, to: along, kind });
@@ -225,14 +225,14 @@ impl Injury {
         })
     }
 
-    /// Takes a clamp off; false where it is not on.
+    /// Takes a clamp off; false if it is not on.
     pub fn unclamp(&mut self, clamp: u32) -> bool {
         let before = self.closures.len();
         self.closures.retain(|closure| closure.kind != ClosureKind::Clamp(clamp));
         self.closures.len() < before
     }
 
-    /// Seals what there is of the vessel between two shares, and the ends there. Returns whether that changed anything.
+    /// Seals the existing vessel between two shares, and the ends there. Returns whether anything changed.
     pub fn seal(&mut self, from: f32, to: f32) -> bool {
         let before = self.clone();
         let is_within = |share: f32| from <= share && share <= to;
@@ -250,7 +250,7 @@ impl Injury {
         *self != before
     }
 
-    /// Seals a stretch of one piece, as one with the seals that it meets.
+    /// Seals a stretch of one piece, and merges it with the seals that it meets.
     fn seal_within(&mut self, mut from: f32, mut to: f32, piece: usize) {
         if !(from < to) {
             return;
@@ -278,7 +278,7 @@ impl Injury {
         })
     }
 
-    /// Up to where blood comes from the parent, and whether an open end lies there.
+    /// The share up to which blood comes from the parent, and the open end there, if any.
     pub fn reach_from_parent(&self) -> (f32, Option<u32>) {
         match (self.closures_of(0).next(), self.gaps.first()) {
             (Some(closure), _) => (closure.from, None),
@@ -287,7 +287,7 @@ impl Injury {
         }
     }
 
-    /// From where on blood may come back from the node, and whether an open end lies there.
+    /// The share from which blood may come back from the node, and the open end there, if any.
     pub fn reach_from_node(&self) -> (f32, Option<u32>) {
         let closed = self.closures_of(self.gaps.len()).map(|closure| closure.to).reduce(f32::max);
         match (closed, self.gaps.last()) {

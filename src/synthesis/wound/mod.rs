@@ -1,23 +1,24 @@
 //! Cuts, clamps, ties and seals on a vessel tree.
 //!
-//! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and a [`SegmentIndex`](super::segment_index::SegmentIndex). Out: a
-//! [`WoundReport`] for each action, with every end that it opened or closed; and at any time [`Wounds`], from which the
-//! flow learns how far blood comes ([`Wounds::interruptions`]) and a renderer what is left of a vessel
-//! ([`Wounds::pieces`]). How that looks is said in [`instances`](super::instances).
+//! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and a
+//! [`SegmentIndex`](super::segment_index::SegmentIndex). Out: a [`WoundReport`] for each action, with every end that it
+//! opened or closed; and at any time [`Wounds`], which gives the flow how far blood may go ([`Wounds::interruptions`])
+//! and a renderer the remaining pieces of a vessel ([`Wounds::pieces`]). Their look is defined in
+//! [`instances`](super::instances).
 //!
 //! The tree itself is never changed: wounds are laid over it, each at a share of a segment. So growth, which only
-//! appends, and deformation, which moves nodes, go on beneath them, and undo is exact.
+//! appends, and deformation, which moves nodes, can continue, and undo is exact.
 //!
 //! # Rules
 //!
-//! - A vessel is severed where its centre line crosses a blade: see [`severed`] for what counts and how exact it is.
-//! - A ball or capsule takes out all that lies within it, and severs what passes its boundary.
-//! - Severed ends draw back at once, by [`Retraction`], over as many segments as it takes, but not past a branching.
-//!   Where no vessel is left, a blade severs nothing and a clamp finds no hold.
-//! - An end is open while it is not sealed, and no clamp, tie or seal is on the piece of its segment that it ends.
-//! - What closes a vessel is a place without length; a cut through it leaves it on the end towards the root. A cut
-//!   through a sealed stretch opens nothing.
-//! - An action that changes nothing does not count: undo passes over it.
+//! - A vessel is severed where its centre line crosses a blade: see [`severed`] for the rules and their exactness.
+//! - A ball or capsule removes all that lies within it, and severs what passes its boundary.
+//! - Severed ends retract at once, by [`Retraction`], over as many segments as needed, but not past a branching. Where
+//!   no vessel is left, a blade severs nothing and a clamp cannot be placed.
+//! - An end is open if it is not sealed, and no clamp, tie or seal is on its piece of the segment.
+//! - A clamp or tie is a place without length; a cut through it leaves it on the end towards the root. A cut through a
+//!   sealed stretch opens nothing.
+//! - An action that changes nothing does not count: undo skips it.
 //!
 //! # Example
 //!
@@ -36,16 +37,18 @@
 //! let report = wounds.cut(&scalpel, &tree, every_segment);
 //! let [proximal, distal] = report.opened[..] else { panic!("two ends") };
 //! assert_eq!((proximal.side, distal.side), (EndSide::Proximal, EndSide::Distal));
-//! // Cut at x = 1; each end drew back by two radii.
+//! // Cut at x = 1; each end retracted by two radii.
 //! assert!((proximal.position.x - 0.8).abs() < 1e-6 && (distal.position.x - 1.2).abs() < 1e-6);
 //! assert_eq!(wounds.undo(&tree).unwrap().closed, [proximal.id, distal.id]);
 //! # Ok(())
 //! # }
 //! ```
 
+mod actions;
 mod blade;
 mod crossing;
 mod error;
+mod history;
 mod injury;
 mod ledger;
 mod pieces;

@@ -1,8 +1,8 @@
-//! What injuries leave of their segments: pieces of vessel, and ways for the blood.
+//! The remains of injured segments: pieces of vessel, and paths for the blood.
 //!
-//! In: [`Wounds`] and their tree. Out: the pieces that are left of a segment, as shares of it, and how each of them ends;
-//! the place nearest to a point where there still is a vessel; and how far blood may come into an injured segment from
-//! both sides. How a piece looks is said in [`instances`](crate::synthesis::instances).
+//! In: [`Wounds`] and their tree. Out: the remaining pieces of a segment, as shares of it, and how each of them ends;
+//! the nearest place of a remaining vessel to a point; and how far blood may flow into an injured segment from both
+//! sides. The look of a piece is defined in [`instances`](crate::synthesis::instances).
 
 use super::crossing::segment;
 use super::injury::{Injury, Tip};
@@ -15,21 +15,21 @@ use crate::synthesis::{
 use bevy_math::Vec3;
 use std::ops::Range;
 
-/// Which piece of a severed segment.
+/// The kind of a piece of a severed segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PieceKind {
-    /// Hangs on the parent's node.
+    /// Attached to the parent's node.
     Proximal,
     /// Between two cuts.
     Floating,
-    /// Hangs on the segment's own node.
+    /// Attached to the segment's own node.
     Distal,
 }
 
 /// How a piece ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PieceEnd {
-    /// In the segment's own node, or its parent's, where the vessel goes on.
+    /// At the segment's own node, or its parent's, where the vessel continues.
     Node,
     /// At a cut that was sealed.
     Sealed,
@@ -37,7 +37,7 @@ pub enum PieceEnd {
     Open,
 }
 
-/// A piece that is left of a severed segment.
+/// A remaining piece of a severed segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SegmentPiece {
     /// The node in which the segment ends.
@@ -52,26 +52,26 @@ pub struct SegmentPiece {
     pub ends: [PieceEnd; 2],
 }
 
-/// How far blood may come into an injured segment.
+/// How far blood may flow into an injured segment.
 ///
-/// From the parent it reaches the share `first`, from the node the share `last`; what lies between carries nothing. A
-/// plain clamp has both at its place, and no end.
+/// From the parent it reaches the share `first`, from the node the share `last`; the part in between carries nothing. A
+/// clamp has both at its place, and no end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blockage {
     /// The node in which the segment ends.
     pub node: NodeId,
-    /// Share at which what the parent feeds is closed or severed.
+    /// Share at which the part fed by the parent is closed or severed.
     pub first: f32,
-    /// Share at which what the node feeds back is closed or severed. At least `first`.
+    /// Share at which the part fed back by the node is closed or severed. At least `first`.
     pub last: f32,
-    /// The open end at `first`; `None` where the lumen is closed.
+    /// The open end at `first`; `None` if the lumen is closed.
     pub proximal: Option<EndId>,
-    /// The open end at `last`; `None` where the lumen is closed.
+    /// The open end at `last`; `None` if the lumen is closed.
     pub distal: Option<EndId>,
 }
 
 impl Blockage {
-    /// The same as the flow has it, on a vessel of a radius in tissue lengths.
+    /// The same for the flow, on a vessel of a radius in tissue lengths.
     pub fn interruption(&self, radius: f32) -> Interruption {
         let outlet = |end: Option<EndId>| end.map(|_| Outlet { radius });
         let Self { first, last, .. } = *self;
@@ -80,7 +80,7 @@ impl Blockage {
 }
 
 impl Wounds {
-    /// Whether the segment of a node is severed, so that only its pieces are left.
+    /// Whether the segment of a node is severed, so that only its pieces remain.
     pub fn is_severed(&self, node: NodeId) -> bool {
         self.injury(node).is_some_and(|injury| !injury.gaps().is_empty())
     }
@@ -90,12 +90,12 @@ impl Wounds {
         self.severed_within(0..usize::MAX)
     }
 
-    /// The severed segments of a range of nodes, in their order, at the cost of those alone.
+    /// The severed segments of a range of nodes, in order. The cost is that of these segments alone.
     pub fn severed_within(&self, nodes: Range<usize>) -> impl Iterator<Item = NodeId> + '_ {
         self.injuries_within(nodes).filter(|(_, injury)| !injury.gaps().is_empty()).map(|(node, _)| node)
     }
 
-    /// What is left of a severed segment, from parent to node; nothing of one that is whole, or wholly taken out.
+    /// The remaining pieces of a severed segment, from parent to node; none for a whole or wholly removed one.
     pub fn pieces(&self, node: NodeId) -> impl Iterator<Item = SegmentPiece> + '_ {
         self.injury(node).into_iter().flat_map(move |injury| {
             let gaps = injury.gaps();
@@ -114,8 +114,8 @@ impl Wounds {
         })
     }
 
-    /// Where the severed ends of a segment lie, and which side of a cut each is, from parent to node: as
-    /// [`ends`](Self::ends) has them, without a tree.
+    /// Places of the severed ends of a segment, with their side of the cut, from parent to node: as in
+    /// [`ends`](Self::ends), but without a tree.
     pub fn tips(&self, node: NodeId) -> impl Iterator<Item = (Place, EndSide)> + '_ {
         let gaps = self.injury(node).map_or(&[][..], Injury::gaps);
         gaps.iter().flat_map(move |gap| {
@@ -125,12 +125,12 @@ impl Wounds {
         })
     }
 
-    /// How far blood may come into a segment; `None` for one to which nothing was done.
+    /// How far blood may flow into a segment; `None` for an uninjured one.
     pub fn blockage(&self, node: NodeId) -> Option<Blockage> {
         self.injury(node).map(|injury| self.blockage_of(node, injury))
     }
 
-    /// How far blood may come into each injured segment, in the order of their nodes.
+    /// How far blood may flow into each injured segment, in the order of their nodes.
     pub fn blockages(&self) -> impl Iterator<Item = Blockage> + '_ {
         self.injuries().map(|(node, injury)| self.blockage_of(node, injury))
     }
@@ -142,8 +142,8 @@ impl Wounds {
         Blockage { node, first, last, proximal: proximal.map(id), distal: distal.map(id) }
     }
 
-    /// The injured segments as gaps for the flow, in the order of their nodes: what
-    /// [`Network::set_interruptions`](crate::synthesis::haemodynamics::Network::set_interruptions) takes. A hole has the
+    /// The injured segments as gaps for the flow, in the order of their nodes, for
+    /// [`Network::set_interruptions`](crate::synthesis::haemodynamics::Network::set_interruptions). A hole has the
     /// radius of its vessel. Segments that the tree doesn't have are left out.
     pub fn interruptions(&self, tree: &VesselTree) -> impl Iterator<Item = (NodeId, Interruption)> {
         self.blockages().filter_map(|blockage| {
@@ -152,12 +152,12 @@ impl Wounds {
         })
     }
 
-    /// The place where a vessel still is that is nearest to a point, and its distance: what was clicked, or what an
-    /// instrument touches.
+    /// The nearest place of a remaining vessel to a point, and its distance: the vessel clicked, or touched by an
+    /// instrument.
     ///
-    /// Distances are to the vessel's wall, negative within, so that a thick vessel that is touched is found before a thin
-    /// one behind it. Of equally near vessels the one of the lowest node counts. `None` where none is within `reach`, or
-    /// a number is not finite. Units: tissue lengths.
+    /// Distances are to the vessel's wall, negative inside, so that a touched thick vessel is found before a thin one
+    /// behind it. Of equally near vessels, the one with the lowest node is returned. `None` if none is within `reach`,
+    /// or a number is not finite. Units: tissue lengths.
     pub fn nearest_place(
         &self,
         tree: &VesselTree,
@@ -191,7 +191,7 @@ impl Wounds {
     }
 }
 
-/// How a piece ends at a gap with that tip, or in a node where there is none.
+/// The end of a piece at a gap with that tip, or at a node if there is no gap.
 fn piece_end(gap: Option<Option<Tip>>) -> PieceEnd {
     match gap {
         None => PieceEnd::Node,
@@ -205,7 +205,7 @@ fn nearest_on(start: Vec3, end: Vec3, [from, to]: [f32; 2], point: Vec3) -> (f32
     let (start, end, point) = (start.as_dvec3(), end.as_dvec3(), point.as_dvec3());
     let along = end - start;
     let share = (point - start).dot(along) / along.length_squared();
-    // Not a number where the segment has no length.
+    // NaN if the segment has no length.
     let share = if share.is_nan() { from } else { share.clamp(f64::from(from), f64::from(to)) as f32 };
     (share, start.lerp(end, f64::from(share)).distance(point) as f32)
 }

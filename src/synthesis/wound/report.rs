@@ -1,46 +1,46 @@
-//! What actions are known by, and what they report.
+//! Identifiers of ends and clamps, and reports of actions.
 
 use crate::synthesis::haemodynamics::EndSide;
 use crate::synthesis::tree::{NodeId, Place};
 use bevy_math::Vec3;
 
-/// A severed end of a vessel. Stays the same while the end exists, through clamps, seals, and the undoing of what took
-/// it away; never given to another end.
+/// Identifier of a severed end of a vessel. It stays the same while the end exists, through clamps, seals, and the undo
+/// of its removal, and is never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(Clone, Hash, PartialEq))]
 pub struct EndId {
-    /// Place in the ledger's list.
+    /// Index in the ledger's list.
     pub index: u32,
     /// Number of the action that severed the vessel, see [`Wounds::generation`](super::Wounds::generation).
     pub generation: u32,
 }
 
-/// A clamp on a vessel.
+/// Identifier of a clamp on a vessel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct ClampId {
-    /// Place in the ledger's list.
+    /// Index in the ledger's list.
     pub index: u32,
     /// Number of the action that put it on.
     pub generation: u32,
 }
 
-/// One end of a severed vessel, where it is now.
+/// One end of a severed vessel, at its present position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct SeveredEnd {
-    /// What it is known by.
+    /// Its identifier.
     pub id: EndId,
-    /// Where on the tree its tip is, after it drew back.
+    /// The place of its tip on the tree, after retraction.
     pub place: Place,
-    /// Which side of the cut.
+    /// Its side of the cut.
     pub side: EndSide,
-    /// Whether its lumen is open: not sealed, and nothing closes the piece of vessel that ends here.
+    /// Whether its lumen is open: it is not sealed, and nothing closes its piece of the segment.
     ///
-    /// An open end bleeds only where blood can reach it, which is for the flow to say: on a piece between two cuts, or
-    /// behind a clamp on another segment, none can.
+    /// An open end bleeds only if blood can reach it, which the flow determines: no blood reaches a piece between two
+    /// cuts, or one behind a clamp on another segment.
     pub is_open: bool,
     /// The tip's position, in tissue lengths.
     pub position: Vec3,
@@ -50,25 +50,25 @@ pub struct SeveredEnd {
     pub radius: f32,
 }
 
-/// What an action, or the undoing of one, changed.
+/// The changes of an action or its undo.
 ///
-/// Ends that were open before and after are in neither list, nor are those that were closed both times, such as the ends
-/// of a cut through a sealed vessel.
+/// Ends that were open before and after are in neither list, nor are those closed both times, such as the ends of a cut
+/// through a sealed vessel.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct WoundReport {
     /// Number of places at which a vessel was severed. 0 for all but cuts.
     pub severed: usize,
-    /// Ends that are open now and were not before, in the order of the nodes, then from parent to node.
+    /// Newly opened ends, in the order of the nodes, then from parent to node.
     pub opened: Vec<SeveredEnd>,
-    /// Ends that were open before and are closed, or gone, now.
+    /// Ends that were open before and are now closed or gone.
     pub closed: Vec<EndId>,
-    /// Clamps that are on now and were not before.
+    /// Newly placed clamps.
     pub clamped: Vec<ClampId>,
-    /// Clamps that were on before and no longer are: taken off, or cut away with their vessel.
+    /// Clamps that were removed: taken off, or cut away with their vessel.
     pub unclamped: Vec<ClampId>,
-    /// The nodes whose segments were severed, taken out, closed or healed, each once: what to tell the flow and to draw
-    /// anew. Which whole segments beside them look otherwise, too, is told by
+    /// The nodes whose segments were severed, removed, closed or healed, each once: those to update in the flow and to
+    /// draw again. Whole segments beside them whose look also changed are returned by
     /// [`FlatEnds::update`](crate::synthesis::instances::FlatEnds::update).
     pub changed: Vec<NodeId>,
 }

@@ -1,24 +1,24 @@
-//! How far severed ends draw back.
+//! Retraction of severed ends.
 
 use super::WoundError;
 
-/// How far severed ends draw back along their vessel.
+/// How far severed ends retract along their vessel.
 ///
-/// It goes on through nodes that only join two segments, so that it is the same however finely a vessel is divided. A
-/// branching, a root or terminal, a clamp or tie, and the gap of another cut hold it: of the way to there an end draws
-/// back by at most [`Self::MOST`], so that a piece between two of them never vanishes, and keeps its lumen.
+/// Retraction passes nodes that only join two segments, so it doesn't depend on how finely a vessel is divided. A
+/// branching, a root or terminal, a clamp or tie, and the gap of another cut hold an end: it retracts by at most
+/// [`Self::MOST`] of the distance to them, so that a piece between two of them never vanishes, and keeps its lumen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
 pub struct Retraction {
-    /// How far an end draws back, as a multiple of the vessel's radius.
+    /// Retraction as a multiple of the vessel's radius.
     ///
-    /// Higher values open wider gaps, the wider the thicker the vessel.
+    /// Higher values open wider gaps, most of all in thick vessels.
     ///
     /// Limits: ≥ 0. Default: [`Self::DEFAULT_RADII`].
     pub radii: f32,
-    /// How far it draws back beside that, whatever its radius.
+    /// Retraction in addition, independent of the radius.
     ///
     /// Higher values make gaps in the thinnest vessels visible, too.
     ///
@@ -27,15 +27,16 @@ pub struct Retraction {
 }
 
 impl Retraction {
-    /// Half again the radius: a gap three radii wide, which is seen, and is no further than a vessel held by its tissue
-    /// may go.
+    /// One and a half radii: a gap three radii wide, which is visible, and not more than a vessel held by its tissue
+    /// may retract.
     pub const DEFAULT_RADII: f32 = 1.5;
-    /// Nothing beside.
+    /// None in addition.
     pub const DEFAULT_LENGTH: f32 = 0.0;
-    /// Most of the way to what holds an end that it draws back by. Below one half, so that two ends never meet.
+    /// Largest share of the distance to what holds an end that the end retracts. Below one half, so that two ends never
+    /// meet.
     pub const MOST: f32 = 0.45;
 
-    /// Passes settings within their limits.
+    /// Checks the settings against their limits.
     ///
     /// # Errors
     /// The first value outside.

@@ -1,16 +1,17 @@
-//! The ledger as it is written to files: what was done to a tree, without the history of undo.
+//! File form of the ledger: the wounds of a tree, without the undo history.
 
 use crate::synthesis::wound::{
     Retraction, WoundError, Wounds,
     injury::{ClosureKind, Gap, Injury},
     ledger::Record,
 };
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use std::collections::BTreeMap;
 
 /// [`Wounds`] in a file.
-#[derive(serde::Serialize, serde::Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(rename = "Wounds", deny_unknown_fields)]
-pub(super) struct SavedWounds {
+struct SavedWounds {
     retraction: Retraction,
     generation: u32,
     injuries: BTreeMap<u32, Injury>,
@@ -39,8 +40,20 @@ impl TryFrom<SavedWounds> for Wounds {
     }
 }
 
+impl Serialize for Wounds {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        SavedWounds::from(self.without_history()).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Wounds {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        SavedWounds::deserialize(deserializer)?.try_into().map_err(D::Error::custom)
+    }
+}
+
 impl SavedWounds {
-    /// Passes what the ledger itself would write of a segment.
+    /// Checks that an injury is one that the ledger itself could write.
     fn check(&self, node: u32, injury: &Injury) -> Result<(), &'static str> {
         let is_listed =
             |list: &[Record], index: u32| list.get(index as usize).is_some_and(|record| record.node == node);

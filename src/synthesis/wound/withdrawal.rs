@@ -1,10 +1,10 @@
-//! Where severed ends come to rest, and what of the tree changes with that.
+//! Rest positions of severed ends, and the resulting changes of segments.
 //!
 //! In: a tree with its wounds, all places at which a blade severs it, and a [`Retraction`]. Out: the changes to each
-//! segment, planned before any of them is made, so that the order of the places makes no difference.
+//! segment, planned before any of them is made, so that the order of the places doesn't matter.
 //!
-//! An end draws back along the centre line, through nodes that only join two segments. Segments that it passes are taken
-//! out; the end lies on the one where it comes to rest.
+//! An end retracts along the centre line, through nodes that only join two segments. Segments that it passes are
+//! removed; the end lies on the one where it comes to rest.
 
 use super::crossing::{Severed, segment};
 use super::injury::{Gap, Injury, NO_INJURY, Removal, Tip};
@@ -16,17 +16,17 @@ use std::collections::BTreeMap;
 /// [`Retraction::MOST`], for lengths.
 const MOST: f64 = Retraction::MOST as f64;
 
-/// What is to be done to a segment.
+/// A planned change of a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Change {
-    /// A gap where there is a vessel.
+    /// Opens a gap in the vessel.
     Open(Gap),
-    /// A gap in place of all that was in it.
+    /// Removes a stretch, and replaces its contents by a gap.
     TakeOut(Removal, Gap),
 }
 
 impl Change {
-    /// Makes the change, and says whether it was one.
+    /// Makes the change, and returns whether anything changed.
     pub fn apply(&self, injury: &mut Injury) -> bool {
         match *self {
             Self::Open(gap) => {
@@ -38,11 +38,11 @@ impl Change {
     }
 }
 
-/// A stretch of one segment on an end's way.
+/// A stretch of one segment on an end's path.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     node: NodeId,
-    /// Share at which the way comes into the segment.
+    /// Share at which the path enters the segment.
     start: f32,
     /// Length of the segment.
     length: f64,
@@ -50,7 +50,7 @@ struct Stretch {
     available: f64,
 }
 
-/// All that a blade does to a tree, in the making.
+/// The plan of all changes of a blade to a tree.
 pub(super) struct Plan<'a, S> {
     tree: &'a VesselTree,
     injuries: &'a BTreeMap<u32, Injury>,
@@ -58,7 +58,7 @@ pub(super) struct Plan<'a, S> {
     hits: &'a [Severed],
     search: S,
     retraction: Retraction,
-    /// The way of the end that came to rest last.
+    /// The path of the end that came to rest last.
     way: Vec<Stretch>,
     /// Number of places at which a vessel is severed.
     pub severed: usize,
@@ -77,8 +77,8 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         Self { tree, injuries, hits, search, retraction, way: Vec::new(), severed: 0, changes: Vec::new() }
     }
 
-    /// Severs the vessel at each place where there is one. `new_end` gives the numbers of ends, by the segment on which
-    /// they come to rest.
+    /// Severs the vessel at each place where there is one. `new_end` returns the number of a new end, for the segment
+    /// on which it comes to rest.
     pub fn cut(&mut self, mut new_end: impl FnMut(NodeId) -> u32) {
         for &Severed { node, from: share, .. } in self.hits {
             if self.injury(node).gap_at(share).is_none() {
@@ -90,11 +90,11 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         }
     }
 
-    /// Takes out the stretch of each place, and severs the vessel where it goes on.
+    /// Removes the stretch of each place, and severs the vessel where it continues.
     pub fn take_out(&mut self, mut new_end: impl FnMut(NodeId) -> u32) {
         for &Severed { node, from, to, enters, leaves } in self.hits {
             let removal = Removal { from, to, enters, leaves };
-            // Where a side lies in a gap, that becomes longer, and keeps its end.
+            // If a side lies in a gap, the gap becomes longer, and keeps its end.
             let (from, proximal) = match self.injury(node).gap_at(from) {
                 _ if !enters => (0.0, None),
                 Some(gap) => (gap.from, gap.proximal),
@@ -115,8 +115,8 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         }
     }
 
-    /// Draws an end back from where it was severed, through all segments but the first: how far the gap reaches in that,
-    /// and the end, if it is there.
+    /// Retracts an end through all segments after the first. Returns the extent of the gap in the first, and the end if
+    /// it lies there.
     fn draw_back(
         &mut self,
         node: NodeId,
@@ -143,7 +143,7 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         (if is_proximal { 0.0 } else { 1.0 }, None)
     }
 
-    /// Where an end comes to rest; `way` then leads there. One that would lie in a node that it passes lies behind it.
+    /// Rest position of an end; `way` then leads there. An end that would lie at a node that it passes lies beyond it.
     fn rest(&mut self, node: NodeId, share: f32, side: EndSide) -> Place {
         let radius = self.tree.radii()[node.index()];
         let wish = f64::from(self.retraction.radii) * f64::from(radius) + f64::from(self.retraction.length);
@@ -161,8 +161,8 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         Place::new(node, along.clamp(0.0, 1.0) as f32)
     }
 
-    /// Follows the vessel from a place, away from where it was severed, until `enough` lies behind or something holds an
-    /// end. Returns the length of that `way`.
+    /// Follows the vessel from a place, away from the cut, until its length is `enough` or something holds the end.
+    /// Returns the length of that `way`.
     fn trace(&mut self, node: NodeId, share: f32, side: EndSide, enough: f64) -> f64 {
         let [near, far] = if side == EndSide::Proximal { [1.0, 0.0] } else { [0.0, 1.0] };
         self.way.clear();
@@ -182,8 +182,8 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         }
     }
 
-    /// What holds an end within a segment: its wounds, or another place of the blade. `from` is where it was severed;
-    /// `None` where it came from the next segment.
+    /// The share at which a wound of the segment, or another place of the blade, holds an end. `from` is the share of
+    /// the cut, `None` if the end came from the next segment.
     fn hold(&self, node: NodeId, from: Option<f32>, side: EndSide) -> Option<f32> {
         let injury = self.injury(node);
         let first = self.hits.partition_point(|hit| hit.node < node);
@@ -197,7 +197,7 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         }
     }
 
-    /// The segment in which the vessel goes on, where that is the only one.
+    /// The only segment in which the vessel continues, if there is exactly one.
     fn next(&mut self, node: NodeId, side: EndSide) -> Option<NodeId> {
         let (joint, next) = match side {
             EndSide::Proximal => {
@@ -212,7 +212,7 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         if several { None } else { next.or(child) }
     }
 
-    /// The segments that leave a node; some perhaps more than once.
+    /// The segments that leave a node, possibly with repeats.
     fn children(&mut self, node: NodeId, mut visit: impl FnMut(NodeId)) {
         let parents = self.tree.parents();
         self.search.leaving(self.tree, node, &mut |child| {
@@ -226,7 +226,7 @@ impl<'a, S: SegmentSearch> Plan<'a, S> {
         self.injuries.get(&node.0).unwrap_or(&NO_INJURY)
     }
 
-    /// In f64, since a segment may be too short for the square of its length in f32.
+    /// In f64, since the square of a short length may underflow in f32.
     fn length(&self, node: NodeId) -> f64 {
         segment(self.tree, node).map_or(0.0, |[start, end]| start.as_dvec3().distance(end.as_dvec3()))
     }

@@ -1,78 +1,8 @@
-//! Reading an organ's mesh from a file, by the ending of its name.
+//! Reading an organ's mesh from a file, by its extension.
 
-use super::{glb, obj_read};
-use crate::synthesis::mesh::{MeshError, TriangleMesh};
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
-
-/// Why a mesh could not be read from a file.
-#[derive(Debug, thiserror::Error)]
-pub enum MeshReadError {
-    /// The file, or one it refers to, cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// A name that ends in none of the formats that are read.
-    #[error("cannot read {}: meshes are read from .glb, .gltf and .obj files", path.display())]
-    UnknownFormat {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Content that is damaged or of an unsupported kind.
-    #[error("cannot read {}: {cause}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        cause: String,
-    },
-    /// Content that makes no usable mesh.
-    #[error("cannot use the mesh in {}: {source}", path.display())]
-    Mesh {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with the mesh.
-        source: MeshError,
-    },
-}
-
-/// What went wrong while content was decoded, before the file's name is known.
-#[derive(Debug)]
-pub(super) enum Fault {
-    /// A file that the content refers to cannot be read.
-    Io(PathBuf, io::Error),
-    /// Anything about the content.
-    Content(String),
-    /// The mesh that was decoded.
-    Mesh(MeshError),
-}
-
-impl Fault {
-    pub(super) fn content(cause: impl Into<String>) -> Self {
-        Self::Content(cause.into())
-    }
-
-    pub(super) fn in_file(self, path: &Path) -> MeshReadError {
-        let named = path.to_path_buf();
-        match self {
-            Self::Io(path, source) => MeshReadError::Io { path, source },
-            Self::Content(cause) => MeshReadError::Content { path: named, cause },
-            Self::Mesh(source) => MeshReadError::Mesh { path: named, source },
-        }
-    }
-}
-
-impl From<MeshError> for Fault {
-    fn from(error: MeshError) -> Self {
-        Self::Mesh(error)
-    }
-}
+use super::{glb::read_glb, obj_read::read_obj_mesh, read::MeshReadError};
+use crate::synthesis::mesh::TriangleMesh;
+use std::path::Path;
 
 /// Reads the mesh in a `.glb`, `.gltf` or `.obj` file.
 ///
@@ -81,13 +11,8 @@ impl From<MeshError> for Fault {
 pub fn load_mesh(path: &Path) -> Result<TriangleMesh, MeshReadError> {
     let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
     match ending.as_deref().and_then(|ending| ending.to_str()) {
-        Some("glb" | "gltf") => glb::read_glb(path),
-        Some("obj") => obj_read::read_obj_mesh(path),
+        Some("glb" | "gltf") => read_glb(path),
+        Some("obj") => read_obj_mesh(path),
         _ => Err(MeshReadError::UnknownFormat { path: path.to_path_buf() }),
     }
-}
-
-/// The bytes of a file.
-pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, Fault> {
-    std::fs::read(path).map_err(|error| Fault::Io(path.to_path_buf(), error))
 }

@@ -1,4 +1,4 @@
-//! Files of meshes: organs are read, vessels are written as tubes.
+//! Mesh files: organs are read, vessels are written as tubes.
 
 #[cfg(feature = "mesh_files")]
 mod glb;
@@ -7,11 +7,15 @@ mod load;
 mod obj;
 #[cfg(feature = "mesh_files")]
 mod obj_read;
+#[cfg(feature = "mesh_files")]
+mod read;
 
 #[cfg(feature = "mesh_files")]
 pub use glb::read_glb;
 #[cfg(feature = "mesh_files")]
-pub use load::{MeshReadError, load_mesh};
+pub use load::load_mesh;
 pub use obj::{ObjOptions, save_obj, write_obj};
 #[cfg(feature = "mesh_files")]
 pub use obj_read::read_obj_mesh;
+#[cfg(feature = "mesh_files")]
+pub use read::MeshReadError;

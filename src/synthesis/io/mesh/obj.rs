@@ -1,4 +1,4 @@
-//! Wavefront OBJ: every segment a closed tube with round ends, good enough to look at in any viewer.
+//! Wavefront OBJ: every segment is a closed tube with round ends, good enough for any viewer.
 //!
 //! A segment is the round cone of its two ends: the hull of a sphere at each. Its surface is made of rings about the
 //! axis; the rings where the cone touches the spheres are shared, so normals are smooth all over. Tubes of neighbouring
@@ -12,31 +12,29 @@ use std::f32::consts::{PI, TAU};
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
-/// How finely segments are drawn.
+/// The fineness of segments in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObjOptions {
     /// Sides of a tube. More make it rounder and the file larger, in proportion.
     ///
-    /// Limits: [`Self::MIN_SIDES`] to [`Self::MAX_SIDES`]; what lies beyond counts as the limit.
-    /// Default: [`Self::DEFAULT_SIDES`].
+    /// Limits: [`Self::MIN_SIDES`] to [`Self::MAX_SIDES`]; values beyond are clamped. Default: [`Self::DEFAULT_SIDES`].
     pub sides: u32,
     /// Rings of vertices on each round end. More make it rounder and the file larger.
     ///
-    /// Limits: 1 to [`Self::MAX_CAP_RINGS`]; what lies beyond counts as the limit.
-    /// Default: [`Self::DEFAULT_CAP_RINGS`].
+    /// Limits: 1 to [`Self::MAX_CAP_RINGS`]; values beyond are clamped. Default: [`Self::DEFAULT_CAP_RINGS`].
     pub cap_rings: u32,
 }
 
 impl ObjOptions {
     /// Fewest sides that enclose anything.
     pub const MIN_SIDES: u32 = 3;
-    /// Most sides: more than anyone sees.
+    /// Most sides: more would not be visible.
     pub const MAX_SIDES: u32 = 64;
-    /// Sides that look round from a little way off.
+    /// Sides that look round from a short distance.
     pub const DEFAULT_SIDES: u32 = 8;
     /// Most rings on an end.
     pub const MAX_CAP_RINGS: u32 = 32;
-    /// Rings that look round from a little way off.
+    /// Rings that look round from a short distance.
     pub const DEFAULT_CAP_RINGS: u32 = 2;
 }
 
@@ -65,8 +63,8 @@ pub fn save_obj(
 /// drawn as that sphere.
 ///
 /// # Errors
-/// Those of `out`; [`ErrorKind::InvalidInput`], before anything is written, where more than 2³² vertices would be
-/// needed: ask for fewer sides.
+/// Those of `out`; [`ErrorKind::InvalidInput`], before anything is written, if more than 2³² vertices would be needed:
+/// use fewer sides.
 pub fn write_obj(mut out: impl Write, trees: &[(VesselKind, &VesselTree)], options: &ObjOptions) -> io::Result<()> {
     let template = Template::new(options);
     let segments: usize = trees.iter().map(|(_, tree)| tree.segments().count()).sum();
@@ -92,7 +90,7 @@ pub fn write_obj(mut out: impl Write, trees: &[(VesselKind, &VesselTree)], optio
     Ok(())
 }
 
-/// The round cone that every segment is a copy of.
+/// The round cone that is copied for every segment.
 struct Template {
     /// Cosine and sine of each side's angle about the axis.
     sides: Vec<(f32, f32)>,
@@ -169,7 +167,7 @@ impl Template {
     }
 }
 
-/// Where one end's sphere lies within the other's, both ends become the larger sphere.
+/// If one end's sphere lies within the other's, both ends become the larger sphere.
 fn without_hidden_end(start: (Vec3, f32), end: (Vec3, f32)) -> ((Vec3, f32), (Vec3, f32)) {
     let distance = start.0.distance(end.0);
     match (start.1 >= distance + end.1, end.1 >= distance + start.1) {

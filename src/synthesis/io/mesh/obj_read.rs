@@ -1,6 +1,6 @@
 //! Reading an organ's mesh from a Wavefront OBJ file.
 
-use super::load::{Fault, MeshReadError, read_bytes};
+use super::read::{Fault, MeshReadError, read_bytes};
 use crate::synthesis::mesh::TriangleMesh;
 use bevy_math::{Vec2, Vec3};
 use std::path::Path;
@@ -28,7 +28,7 @@ fn decode(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
         let corners = mesh.indices.as_chunks().0.iter();
         triangles.extend(corners.map(|corners| corners.map(|index| index.saturating_add(first))));
     }
-    // Texture coordinates of a part of the vertices are of no use.
+    // Texture coordinates for only some of the vertices are of no use.
     let uvs = (uvs.len() == positions.len()).then_some(uvs);
     Ok(TriangleMesh::new(positions, triangles, uvs)?)
 }
@@ -71,7 +71,7 @@ mod tests {
         assert!(decode(&[0xff, 0xfe, 0x80, b'\n', b'f']).is_err());
         let text = SQUARE.as_bytes();
         for end in 0..text.len() {
-            // What is left may be a mesh or not.
+            // The rest may be a mesh or not.
             let _ = decode(&text[..end]);
             let mut bent = text.to_vec();
             bent[end] = bent[end].wrapping_mul(31).wrapping_add(17);

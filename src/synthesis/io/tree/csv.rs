@@ -21,8 +21,8 @@ pub fn save_csv(path: impl AsRef<Path>, trees: &[(VesselKind, &VesselTree)]) -> 
 /// | column | meaning |
 /// |---|---|
 /// | `system` | kind of the vessels: `arterial`, `venous`, `portal` or `ductal` |
-/// | `id`, `parent` | indices, from 0, of the node that the segment ends in and of its parent, within that tree |
-/// | `x0`, `y0`, `z0`, `x1`, `y1`, `z1` | where the segment begins and ends, in tissue lengths |
+/// | `id`, `parent` | indices, from 0, of the segment's end node and of its parent, within that tree |
+/// | `x0`, `y0`, `z0`, `x1`, `y1`, `z1` | start and end of the segment, in tissue lengths |
 /// | `r0`, `r1` | radius of the parent and of the segment itself, in tissue lengths |
 /// | `length` | in tissue lengths |
 /// | `strahler` | Strahler order, from 1 |

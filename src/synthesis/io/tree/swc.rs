@@ -9,27 +9,27 @@ use crate::synthesis::tree::{NO_PARENT, VesselKind, VesselTree};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// What an SWC file says beside the tree.
+/// The contents of an SWC file besides the tree.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SwcOptions {
     /// Lines of the header, such as the units of lengths, the seed and the preset. A line break begins a new line.
     ///
-    /// Default: none. The name and version of this crate and the names of the columns are always there.
+    /// Default: none. The name and version of this crate and the names of the columns are always written.
     pub comments: Vec<String>,
-    /// The type column of every node: 0 is undefined, 1 to 7 are parts of neurons and glia, beyond them the meaning is the
-    /// user's. [`swc_structure`] gives that of a kind of vessels.
+    /// The type column of every node: 0 is undefined, 1 to 7 are parts of neurons and glia, other values are up to the
+    /// user. [`swc_structure`] gives the value for a kind of vessels.
     ///
     /// Default: 0.
     pub structure: u32,
 }
 
-/// The type column that this crate gives to vessels of a kind: 10 for arteries, 11 for veins, 12 for portal veins, 13 for
+/// The type column of this crate for vessels of a kind: 10 for arteries, 11 for veins, 12 for portal veins, 13 for
 /// ducts. The format has no types of its own for vessels.
 pub fn swc_structure(kind: VesselKind) -> u32 {
     FIRST_STRUCTURE + kind.index() as u32
 }
 
-/// The kind of vessels that a type column stands for; `None` for types that are not of [`swc_structure`].
+/// The kind of vessels for a type column; `None` for types that [`swc_structure`] doesn't give.
 pub fn kind_of_swc_structure(structure: u32) -> Option<VesselKind> {
     VesselKind::ALL.get(structure.checked_sub(FIRST_STRUCTURE)? as usize).copied()
 }
@@ -47,7 +47,7 @@ pub fn save_swc(path: impl AsRef<Path>, tree: &VesselTree, options: &SwcOptions)
 
 /// Writes a tree as SWC, nodes in the tree's order, lengths as they are.
 ///
-/// Every number has the digits to be read back to the same bits. An empty tree gives a header alone.
+/// Every number has enough digits to be read back to the same bits. An empty tree gives only a header.
 ///
 /// # Errors
 /// Those of `out`.

@@ -6,17 +6,17 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-/// How a file is read.
+/// Options for reading a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SwcReadOptions {
-    /// Radius given to nodes whose own is smaller, zero or negative, as traced vessels at times have it.
+    /// Radius for nodes whose own is smaller, zero or negative, as sometimes in traced vessels.
     ///
     /// Units: those of the file. Limits: finite and > 0; otherwise it has no effect.
     /// Default: `None`, which makes such nodes an error.
     pub least_radius: Option<f32>,
 }
 
-/// Why a file gave no tree.
+/// The reason why a file could not be read as a tree.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file cannot be opened.
@@ -24,15 +24,15 @@ pub enum ReadError {
     Open {
         /// The path given.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// Reading broke off.
+    /// Reading failed.
     #[error("cannot read line {line}: {source}")]
     Read {
         /// The line, from 1.
         line: usize,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
     /// A line with fewer than seven columns.
@@ -50,9 +50,9 @@ pub enum ReadError {
         line: usize,
         /// Name of the column.
         column: &'static str,
-        /// What the file says, cut off after [`ReadError::SHOWN`] characters.
+        /// The value in the file, cut off after [`ReadError::SHOWN`] characters.
         value: String,
-        /// What it may be.
+        /// The expected value.
         expected: &'static str,
     },
     /// Two nodes with one id.
@@ -79,7 +79,7 @@ pub enum ReadError {
         /// Its id.
         id: i64,
     },
-    /// Something that no tree can hold, such as too many nodes.
+    /// An invalid tree, such as one with too many nodes.
     #[error(transparent)]
     Tree(#[from] TreeError),
 }
@@ -106,8 +106,8 @@ pub fn load_swc(path: impl AsRef<Path>, options: &SwcReadOptions) -> Result<Vess
 /// after the seventh. Comments may hold any bytes, a byte order mark is skipped, lines may end in CR LF.
 ///
 /// # Errors
-/// The first line that is no node, names a node that is not there, or closes a loop; a radius that is not above zero,
-/// unless [`SwcReadOptions::least_radius`] lifts it.
+/// The first line that is not a node, refers to a missing node, or closes a loop; a radius that is not above zero,
+/// unless [`SwcReadOptions::least_radius`] raises it.
 pub fn read_swc(input: impl BufRead, options: &SwcReadOptions) -> Result<VesselTree, ReadError> {
     let samples = read_samples(input, options)?;
     let parents = resolve_parents(&samples)?;
@@ -150,7 +150,7 @@ fn read_samples(mut input: impl BufRead, options: &SwcReadOptions) -> Result<Vec
             break;
         }
         let text = bytes.strip_prefix(b"\xef\xbb\xbf").filter(|_| line == 1).unwrap_or(&bytes);
-        // Comments in old files are in any encoding. What is not UTF-8 elsewhere fails as a number, with its line.
+        // Comments in old files may have any encoding. Other text that is not UTF-8 fails as a number, with its line.
         let text = String::from_utf8_lossy(text.split(|&byte| byte == b'#').next().unwrap_or_default());
         if !text.trim().is_empty() {
             samples.push(parse(&text, line, options)?);
@@ -234,7 +234,7 @@ fn parents_first(samples: &[Sample], parents: &[u32]) -> Result<Vec<u32>, ReadEr
         let end = by_parent.partition_point(|&index| parents[index as usize] <= parent);
         &by_parent[start..end]
     };
-    // NO_PARENT is above every index, so the roots are the children of NO_PARENT.
+    // NO_PARENT is above every index, so roots are handled as its children.
     let mut order = children(NO_PARENT).to_vec();
     let mut next = 0;
     while next < order.len() {
@@ -254,7 +254,7 @@ fn cycle(samples: &[Sample], parents: &[u32], reached: &[u32]) -> ReadError {
         is_reached[index as usize] = true;
     }
     let mut at = is_reached.iter().position(|&is_reached| !is_reached).unwrap_or_default();
-    // Who is not reached from a root has ancestors without end: after as many steps as there are nodes, a loop.
+    // A node that no root reaches has endless ancestors: after as many steps as there are nodes, this is on a loop.
     for _ in 0..parents.len() {
         at = parents.get(at).map_or(at, |&parent| parent as usize);
     }

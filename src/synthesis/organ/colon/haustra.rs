@@ -1,13 +1,13 @@
-//! Haustra: where the wall is drawn in between the taeniae, row by row.
+//! Haustra: the pouches of the wall between the taeniae, row by row.
 
 use crate::synthesis::{organ::centre_line::CentreLine, random::VesselRng};
 use bevy_math::ops;
 use rand::RngExt;
 
-/// Rows of haustra, one between each two taeniae.
+/// Rows of haustra, one between each pair of taeniae.
 pub(super) const ROWS: usize = 3;
 
-/// Least share of the mean length that a haustrum has.
+/// Least length of a haustrum, as a share of the mean.
 const SHORTEST: f32 = 0.55;
 
 /// One row of haustra along the colon.
@@ -15,14 +15,14 @@ const SHORTEST: f32 = 0.55;
 pub(super) struct Row {
     /// Arc length of each semilunar fold, ascending, in metres.
     folds: Vec<f32>,
-    /// How far the haustrum before each fold bulges, relative to the mean.
+    /// Bulge of the haustrum before each fold, relative to the mean.
     bulges: Vec<f32>,
 }
 
-/// The wall's state at one place of a row.
+/// The shape of the wall at one place of a row.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Haustrum {
-    /// How far the wall bulges out: 0 on a fold, about 1 in the middle of a haustrum.
+    /// Bulge of the wall: 0 on a fold, about 1 in the middle of a haustrum.
     pub bulge: f32,
     /// Distance to the nearest fold, in metres.
     pub to_fold: f32,
@@ -48,13 +48,13 @@ impl Row {
     }
 }
 
-/// Places folds between two arc lengths: irregular, staggered between the rows, now and then one missing.
+/// Places folds between two arc lengths: irregular, staggered between the rows, and sometimes missing.
 pub(super) fn rows(line: &CentreLine, from: f32, to: f32, length: f32, rng: &mut VesselRng) -> [Row; ROWS] {
     let mut rows: [Row; ROWS] = Default::default();
     let mean_radius = line.at(0.5 * (from + to)).radius;
     let mut arc = from;
     while arc < to {
-        // Narrow parts have shorter haustra, and those of the left colon are further apart for their calibre.
+        // Narrow parts have shorter haustra; those of the left colon are longer relative to their calibre.
         let local = length * ops::powf(line.at(arc).radius / mean_radius, 0.6);
         arc += local * rng.random_range(0.74..=1.26);
         for row in &mut rows {

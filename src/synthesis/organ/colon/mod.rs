@@ -1,9 +1,10 @@
-//! The large intestine: a procedural colon with haustra, three taeniae coli and a lumen, another for every seed.
+//! The large intestine: a procedural colon with haustra, three taeniae coli and a lumen, different for every seed.
 //!
-//! The course (caecum with its appendix, ascending colon, hepatic flexure, transverse colon, splenic flexure, descending
-//! colon, sigmoid, rectum) is a spline that is kept off itself; the wall is swept along it. Between three longitudinal
-//! bands, the taeniae coli, the wall bulges into haustra; between two haustra a semilunar fold reaches into the lumen.
-//! The wall has a thickness. It ends blind in the caecum and is cut open at the rectum, so one can look in.
+//! The course (caecum with its appendix, ascending colon, hepatic flexure, transverse colon, splenic flexure,
+//! descending colon, sigmoid, rectum) is a spline that avoids itself; the wall is swept along it. Between three
+//! longitudinal bands, the taeniae coli, the wall bulges into haustra; between two haustra a semilunar fold reaches
+//! into the lumen. The wall has a thickness. It ends blind in the caecum and is cut open at the rectum, so the lumen is
+//! visible.
 //!
 //! The mesh is one closed surface of the topology of a sphere: from the blind end along the outside to the rim, and back
 //! along the inside. `u` runs around the tube from the mesenteric border, `v` along that way, so the chart has no
@@ -20,7 +21,10 @@
 
 mod haustra;
 mod path;
+mod settings;
 mod wall;
+
+pub use settings::ColonSettings;
 
 use crate::synthesis::random::Stream;
 use crate::synthesis::{
@@ -30,130 +34,6 @@ use crate::synthesis::{
 use bevy_math::{Vec2, Vec3, ops};
 use std::{f32::consts::TAU, ops::Range};
 use wall::{Side, Wall};
-
-/// What a colon looks like. The same settings give the same mesh, bit for bit.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
-#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
-pub struct ColonSettings {
-    /// Which colon: course, calibres, haustra and colours vary with it.
-    ///
-    /// Default: 0.
-    pub seed: u64,
-    /// Width across the abdomen, from the ascending to the descending colon's outer side, before variation.
-    ///
-    /// Course and appendix scale with it; calibre and haustra do not.
-    ///
-    /// Units: metres. Limits: 0.05 to 5. Default: [`Self::DEFAULT_WIDTH`].
-    pub width: f32,
-    /// Mean outer diameter. The caecum is about a quarter wider, the descending colon and sigmoid a fifth narrower.
-    ///
-    /// A calibre too large for the width is lowered where limbs would touch or bends close up.
-    ///
-    /// Units: metres. Limits: 0.04 to 0.25 of the width. Default: [`Self::DEFAULT_CALIBRE`].
-    pub calibre: f32,
-    /// Thickness of the wall between two folds.
-    ///
-    /// Units: metres. Limits: 0.01 to 0.15 of the calibre. Default: [`Self::DEFAULT_WALL_THICKNESS`].
-    pub wall_thickness: f32,
-    /// Mean length of a haustrum in a part of mean calibre.
-    ///
-    /// Higher values give fewer and longer haustra.
-    ///
-    /// Units: metres. Limits: 0.25 to 4 calibres. Default: [`Self::DEFAULT_HAUSTRUM_LENGTH`].
-    pub haustrum_length: f32,
-    /// How deep the haustra are: 0 is a smooth tube.
-    ///
-    /// Limits: 0 to 1.2. Default: [`Self::DEFAULT_HAUSTRA_DEPTH`].
-    pub haustra_depth: f32,
-    /// Width of a taenia coli.
-    ///
-    /// Units: metres. Limits: 0 to half a calibre. Default: [`Self::DEFAULT_TAENIA_WIDTH`].
-    pub taenia_width: f32,
-    /// How far colons of different seeds differ in course and calibre: at 0 only haustra and colours do.
-    ///
-    /// Limits: 0 to 1.5. Default: [`Self::DEFAULT_VARIATION`].
-    pub variation: f32,
-    /// Whether the caecum has an appendix: a thin solid stub, without a lumen of its own.
-    ///
-    /// Default: true.
-    pub appendix: bool,
-    /// Number of triangles aimed at; the mesh has within a tenth of it.
-    ///
-    /// Limits: 2,000 to 4,000,000. Default: [`Self::DEFAULT_TRIANGLES`].
-    pub triangles: u32,
-}
-
-impl ColonSettings {
-    /// Within the 25 to 35 cm of an adult abdomen.
-    pub const DEFAULT_WIDTH: f32 = 0.32;
-    /// Within the 4 to 7 cm that radiology texts give for a colon that is not distended.
-    pub const DEFAULT_CALIBRE: f32 = 0.052;
-    /// Within the 1 to 3 mm of a wall on computed tomography.
-    pub const DEFAULT_WALL_THICKNESS: f32 = 0.0028;
-    /// About half the calibre.
-    pub const DEFAULT_HAUSTRUM_LENGTH: f32 = 0.027;
-    /// Haustra as deep as they are drawn in anatomy texts.
-    pub const DEFAULT_HAUSTRA_DEPTH: f32 = 1.0;
-    /// Within the 6 to 12 mm of anatomy texts.
-    pub const DEFAULT_TAENIA_WIDTH: f32 = 0.009;
-    /// As far as colons of adults differ without being remarkable.
-    pub const DEFAULT_VARIATION: f32 = 1.0;
-    /// Enough for round folds in a picture of the whole organ.
-    pub const DEFAULT_TRIANGLES: u32 = 80_000;
-
-    /// Makes the colon.
-    ///
-    /// # Errors
-    /// A setting outside its limits, by name.
-    pub fn generate(&self) -> Result<Colon, OrganSettingsError> {
-        self.validate()?;
-        Ok(build(self))
-    }
-
-    /// Checks every setting against its limits.
-    ///
-    /// # Errors
-    /// The first value outside its limits.
-    pub fn validate(&self) -> Result<(), OrganSettingsError> {
-        let check = |name, value: f32, range: std::ops::RangeInclusive<f32>, limits| {
-            if range.contains(&value) {
-                Ok(())
-            } else {
-                Err(OrganSettingsError { organ: "colon", name, value, limits })
-            }
-        };
-        let calibre = self.calibre;
-        check("width", self.width, 0.05..=5.0, "0.05 to 5 m")?;
-        check("calibre", calibre, 0.04 * self.width..=0.25 * self.width, "0.04 to 0.25 of the width")?;
-        let thickness = 0.01 * calibre..=0.15 * calibre;
-        check("wall_thickness", self.wall_thickness, thickness, "0.01 to 0.15 of the calibre")?;
-        let length = 0.25 * calibre..=4.0 * calibre;
-        check("haustrum_length", self.haustrum_length, length, "0.25 to 4 calibres")?;
-        check("haustra_depth", self.haustra_depth, 0.0..=1.2, "0 to 1.2")?;
-        check("taenia_width", self.taenia_width, 0.0..=0.5 * calibre, "0 to half a calibre")?;
-        check("variation", self.variation, 0.0..=1.5, "0 to 1.5")?;
-        check("triangles", self.triangles as f32, 2_000.0..=4_000_000.0, "2,000 to 4,000,000")
-    }
-}
-
-impl Default for ColonSettings {
-    fn default() -> Self {
-        Self {
-            seed: 0,
-            width: Self::DEFAULT_WIDTH,
-            calibre: Self::DEFAULT_CALIBRE,
-            wall_thickness: Self::DEFAULT_WALL_THICKNESS,
-            haustrum_length: Self::DEFAULT_HAUSTRUM_LENGTH,
-            haustra_depth: Self::DEFAULT_HAUSTRA_DEPTH,
-            taenia_width: Self::DEFAULT_TAENIA_WIDTH,
-            variation: Self::DEFAULT_VARIATION,
-            appendix: true,
-            triangles: Self::DEFAULT_TRIANGLES,
-        }
-    }
-}
 
 /// A procedural colon.
 ///
@@ -180,8 +60,19 @@ pub struct Colon {
     pub front: Viewpoint,
     /// From before the cut end into the lumen.
     pub rim: Viewpoint,
-    /// From within the lumen, along its straightest part: what an endoscope sees.
+    /// From within the lumen, along its straightest part: the view of an endoscope.
     pub lumen: Viewpoint,
+}
+
+impl ColonSettings {
+    /// Makes the colon.
+    ///
+    /// # Errors
+    /// A setting outside its limits, by name.
+    pub fn generate(&self) -> Result<Colon, OrganSettingsError> {
+        self.validate()?;
+        Ok(build(self))
+    }
 }
 
 /// A ring of vertices.
@@ -200,7 +91,7 @@ fn build(settings: &ColonSettings) -> Colon {
     let outer = profile(&wall, Side::Outer);
     let inner = profile(&wall, Side::Inner);
     let length = outer.length + inner.length;
-    // Squarish triangles: rings as far apart as columns are on average, a little closer to carry the folds.
+    // Nearly square cells: rings as far apart as columns on average, but a little closer for the folds.
     let columns = (0.5 * TAU * 0.5 * settings.calibre * settings.triangles as f32 / length).sqrt() / 3.0;
     let columns = (columns.round() as usize * 3).max(12);
     let rings = settings.triangles as usize / (2 * columns);
@@ -226,7 +117,7 @@ fn build(settings: &ColonSettings) -> Colon {
     describe(&wall, mesh, outer, inner)
 }
 
-/// The mean radius along one side, by the length of the wall that one walks.
+/// Arc length of the centre line as a function of the length along one side of the wall.
 struct Profile {
     /// Arc length of the centre line and length along the wall from the blind end, both ascending.
     samples: Vec<(f32, f32)>,
@@ -352,7 +243,7 @@ fn ring_vertices(wall: &Wall, ring: &Ring, angles: &[f32], pole: bool) -> Vec<(V
     vertices
 }
 
-/// Adds to a mesh what a scene needs beside it.
+/// Adds data for a scene to a mesh.
 fn describe(wall: &Wall, mesh: ShadedMesh, outer: Range<usize>, inner: Range<usize>) -> Colon {
     let (low, high) = mesh.bounds();
     let centre = 0.5 * (low + high);
@@ -388,7 +279,7 @@ fn lumen_view(wall: &Wall) -> Viewpoint {
         (straight * straight * straight * here.radius, here.centre, there.centre)
     });
     let best = candidates.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, Vec3::ZERO, Vec3::Y));
-    // Along a vertical limb the front of the body is at the top of the picture.
+    // In a vertical limb the front of the body is at the top of the picture.
     let level = (best.2 - best.1).normalize_or(Vec3::X).y.abs() < 0.8;
     Viewpoint { eye: best.1, target: best.2, up: if level { Vec3::Y } else { Vec3::Z } }
 }

@@ -8,21 +8,21 @@ use crate::synthesis::{
 use bevy_math::{Vec3, ops};
 use rand::RngExt;
 
-/// Width of [`COURSE`] with its wall, in metres: what [`ColonSettings::width`] is measured against.
+/// Width of [`COURSE`] with its wall, in metres: the reference of [`ColonSettings::width`].
 const COURSE_WIDTH: f32 = 0.34;
 /// Mean calibre of [`COURSE`], in metres.
 const COURSE_CALIBRE: f32 = 0.052;
 /// Arc length between the samples of the centre line, in metres.
 const SPACING: f32 = 0.003;
-/// Where the mesentery leaves the back wall of the abdomen: the vessels come from there.
+/// The root of the mesentery at the back wall of the abdomen, from which the vessels come.
 pub(super) const MESENTERY_ROOT: Vec3 = Vec3::new(0.0, 0.02, -0.09);
 
 /// From the blind end of the caecum to the rectum: position (x to the patient's left, y up, z to the front), radius (in
 /// metres) and depth of the haustra (a share).
 ///
 /// Proportions after the descriptions of Gray's Anatomy: the caecum is the widest part, the calibre falls toward the sigmoid,
-/// the splenic flexure is higher, further back and sharper than the hepatic one, the transverse colon hangs to the front,
-/// haustra get shallower toward the rectum, which has a few transverse folds only.
+/// the splenic flexure is higher, further back and sharper than the hepatic one, the transverse colon hangs to the
+/// front, haustra get shallower toward the rectum, which has only a few transverse folds.
 const COURSE: [([f32; 3], f32, f32); 25] = [
     ([-0.116, -0.140, 0.015], 0.034, 0.9),
     ([-0.124, -0.095, 0.000], 0.034, 1.0),
@@ -50,7 +50,7 @@ const COURSE: [([f32; 3], f32, f32); 25] = [
     ([0.004, -0.175, -0.030], 0.029, 0.25),
     ([0.014, -0.215, 0.004], 0.023, 0.2),
 ];
-/// Indices of [`COURSE`] by section, for variation that moves a section as a whole.
+/// Indices of [`COURSE`] by section, for variation of whole sections.
 const TRANSVERSE: std::ops::Range<usize> = 6..12;
 const SIGMOID: std::ops::Range<usize> = 18..22;
 
@@ -99,7 +99,7 @@ pub(super) fn course(settings: &ColonSettings, clearance: f32, rng: &mut VesselR
     CentreLine::new(&controls, clearance, SPACING * scale, MESENTERY_ROOT * scale)
 }
 
-/// Moves whole sections: how far the transverse colon hangs, how high the flexures are, how the sigmoid loops.
+/// Varies whole sections: the sag of the transverse colon, the height of the flexures, the loop of the sigmoid.
 fn vary_sections(points: &mut [Vec3], draw: &mut impl FnMut(f32) -> f32) {
     let sag = draw(0.045);
     let front = draw(0.012);

@@ -1,6 +1,6 @@
-//! The colon's wall: how far its outer and inner side are from the centre line, and their colour.
+//! The colon's wall: distances of its outer and inner side from the centre line, and their colours.
 //!
-//! Both sides are graphs over arc length and angle, the inner below the outer, so that the wall cannot cut itself where
+//! Both sides are graphs over arc length and angle, the inner below the outer, so the wall cannot intersect itself if
 //! the centre line leaves room for it.
 
 use super::{
@@ -20,20 +20,20 @@ use crate::synthesis::{
 use bevy_math::{Vec3, ops};
 use std::f32::consts::{PI, TAU};
 
-/// Room that the wall may take, as a multiple of the mean radius: the outermost bulge.
+/// Room for the wall, as a multiple of the mean radius: the outermost bulge.
 pub(super) const CLEARANCE: f32 = 1.26;
 
-/// Radii relative to the mean radius, where haustra are as deep as the settings' default.
+/// Radii relative to the mean radius, for haustra of the default depth.
 const TAENIA: f32 = 0.93;
 const GROOVE: f32 = 0.75;
 const BULGE: f32 = 0.40;
 const TAENIA_RIDGE: f32 = 0.022;
-/// How far a semilunar fold stands into the lumen, relative to the mean radius.
+/// Height of a semilunar fold in the lumen, relative to the mean radius.
 const FOLD: f32 = 0.26;
 /// Half width of a semilunar fold's crest, in metres.
 const FOLD_WIDTH: f32 = 0.0046;
 
-/// Which side of the wall.
+/// A side of the wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Side {
     Outer,
@@ -58,7 +58,7 @@ pub(super) struct Wall {
     colour_noise: Noise,
 }
 
-/// What all columns of a ring share.
+/// Values shared by all columns of a ring.
 pub(super) struct Section {
     pub frame: Frame,
     mean: f32,
@@ -203,7 +203,7 @@ struct Place {
     belly: f32,
     /// How round the haustrum is across: 1 in its middle.
     roundness: f32,
-    /// How far a fold stands up across: from 0 at a taenia to 1, so that it has the shape of a half moon.
+    /// Height of the fold across: from 0 at a taenia to 1, so that it has the shape of a half moon.
     crescent: f32,
     haustrum: Haustrum,
 }
@@ -214,7 +214,7 @@ fn cap(distance: f32, length: f32) -> f32 {
     (1.0 - from_equator * from_equator).max(0.0).sqrt()
 }
 
-/// The larger of two, rounded over where they are within `blend` of each other.
+/// Smooth maximum of two numbers, blended if they are within `blend` of each other.
 fn smooth_max(a: f32, b: f32, blend: f32) -> f32 {
     let near = (blend - (a - b).abs()).max(0.0) / blend.max(f32::MIN_POSITIVE);
     a.max(b) + 0.25 * near * near * blend

@@ -1,4 +1,4 @@
-//! What a grid of points is made of: bricks of cells, and the blocks of points that hang in them.
+//! The parts of a point grid: bricks of cells, and their blocks of points.
 
 use bevy_math::{Vec3, Vec4};
 
@@ -10,11 +10,11 @@ pub const CELLS: usize = (SIDE * SIDE * SIDE) as usize;
 pub const LANES: usize = 4;
 /// The id of no point.
 pub const NONE: u32 = u32::MAX;
-/// The brick without points, which stands in the table where there is no other, and the block without points, which ends
-/// every chain. With them a question needs not ask whether there is something to look at.
+/// The brick without points, which fills empty places of the table, and the block without points, which ends every
+/// chain. With them a query needs no test for existence.
 pub const EMPTY: u32 = 0;
 
-/// 4×4×4 cells: which of them hold points, and the first block of each of these.
+/// 4×4×4 cells: a mask of those with points, and the first block of each.
 #[derive(Clone, Debug)]
 pub struct Brick {
     pub filled: u64,
@@ -31,7 +31,7 @@ pub struct Block {
     pub ids: [u32; LANES],
 }
 
-/// What stands for a removed point. No distance to it passes a comparison.
+/// The mark of a removed point. No distance to it passes a comparison.
 pub const REMOVED: Vec3 = Vec3::NAN;
 
 impl Block {
@@ -51,7 +51,7 @@ impl Block {
         self.ids.iter().take_while(|&&id| id != NONE).count()
     }
 
-    /// Squared distances of all lanes, no number for empty ones.
+    /// Squared distances of all lanes, NaN for empty ones.
     #[inline]
     pub fn distances(&self, center: Vec3) -> Vec4 {
         let (x, y, z) = (self.x - center.x, self.y - center.y, self.z - center.z);
@@ -85,7 +85,7 @@ const fn cells_in_ranges(stride: u32) -> [u64; 16] {
     masks
 }
 
-/// Number of the part of a range of cells, `low` to `high` along an axis, that lies in a brick.
+/// Number of that part of a range of cells, `low` to `high` along an axis, which lies in a brick.
 #[inline]
 pub fn range(low: u32, high: u32, brick: u32) -> usize {
     let first = brick * SIDE;

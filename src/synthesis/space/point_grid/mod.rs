@@ -1,13 +1,12 @@
-//! An index over points that come, go and are asked for while vessels grow.
+//! An index over points that are added, removed and queried while vessels grow.
 //!
-//! A uniform grid in three levels. A table of bricks of 4×4×4 cells, of which only those with points exist, so a surface in
-//! a large box costs little memory. Each brick knows its filled cells as the bits of one word: a question looks at those of
-//! them that its box meets, and empty space costs next to nothing. And a cell is a chain of blocks, each of them one cache
-//! line with up to four points, whose distances are found at once. Adding a point allocates nothing once the arrays have
-//! room.
+//! A uniform grid in three levels. The table holds bricks of 4×4×4 cells. Only bricks with points exist, so a surface
+//! in a large box costs little memory. Each brick marks its filled cells as the bits of one word: a query visits those
+//! in its box, and empty space costs next to nothing. A cell is a chain of blocks, each one cache line with up to four
+//! points, whose distances are computed at once. Adding a point allocates nothing once the arrays have room.
 //!
 //! Why not kiddo here: its mutable tree refuses more than 32 points that share a coordinate, as all of a disc at z = 0
-//! do, and points cannot be removed from its immutable one. It serves where a point set is static (coverage of a
+//! do, and points cannot be removed from its immutable one. It is used where a point set is static (coverage of a
 //! finished tree).
 
 mod brick;
@@ -17,14 +16,14 @@ use crate::synthesis::space::order::SpatialOrder;
 use crate::synthesis::space::point_grid::brick::{Block, Brick, EMPTY, LANES, NONE, REMOVED, SIDE};
 use bevy_math::{UVec3, Vec3, Vec3A, bounding::Aabb3d};
 
-/// Most bricks in the table: 16 MiB. Coarser cells keep larger spaces below it, at the cost of speed alone.
+/// Most bricks in the table: 16 MiB. Larger spaces get coarser cells, which cost only speed.
 const MAX_BRICKS: f64 = (1u32 << 22) as f64;
-/// Fewest points whose order in memory matters: less lie in the processor's cache however they are ordered.
+/// Fewest points whose order in memory matters: fewer fit in the processor's cache in any order.
 const WORTH_ORDERING: usize = 20_000;
 
 /// Points with dense ids in a box, found by distance.
 ///
-/// Points outside the box are kept in its outermost cells: correct, if slower.
+/// Points outside the box are kept in its outermost cells: correct, but slower.
 #[derive(Clone, Debug, Default)]
 pub struct PointGrid {
     origin: Vec3A,
@@ -32,9 +31,9 @@ pub struct PointGrid {
     inverse_cell: f32,
     /// Number of cells along each axis.
     cells: UVec3,
-    /// Index of the last cell along each axis, as a number that coordinates are compared with.
+    /// Index of the last cell along each axis, as a float to compare coordinates with.
     last: Vec3A,
-    /// How much wider than asked for, in cells, a box is taken so that rounding leaves out no cell.
+    /// Margin added to a query's box, in cells, so that rounding leaves out no cell.
     margin: f32,
     /// Number of bricks along x, and in an xy layer.
     row: u32,
@@ -42,37 +41,37 @@ pub struct PointGrid {
     table: Vec<u32>,
     bricks: Vec<Brick>,
     blocks: Vec<Block>,
-    /// The block that follows each one in its cell, or among those that are free.
+    /// The next block after each one, in its cell or among the free ones.
     next: Vec<u32>,
-    /// First of the blocks that are free.
+    /// First of the free blocks.
     free: u32,
-    /// Points by id; [`REMOVED`] for those that are not there.
+    /// Points by id; [`REMOVED`] for removed ones.
     points: Vec<Vec3>,
-    /// Number of ids when the points were last put in order.
+    /// Number of ids when the points were last ordered.
     ordered: usize,
     order: SpatialOrder,
 }
 
 impl PointGrid {
-    /// An empty grid over a box. Cells have at least the side `cell`; more where the box would need too many.
+    /// An empty grid over a box. Cells have at least the side `cell`, and more if the box would need too many.
     ///
-    /// A cell a little more than twice as large as the distances asked for is a good choice: a ball then meets no more than two
-    /// cells along each axis.
+    /// A good choice is a little more than twice the query distance: a ball then meets at most two cells along each
+    /// axis.
     pub fn new(bounds: &Aabb3d, cell: f32) -> Self {
         let mut grid = Self::default();
         grid.reset(bounds, cell);
         grid
     }
 
-    /// Removes all points and lays the grid anew, keeping its memory.
+    /// Removes all points and lays out the grid again, keeping its memory.
     pub fn reset(&mut self, bounds: &Aabb3d, cell: f32) {
         self.points.clear();
         self.ordered = 0;
         self.lay(bounds.min, bounds.max, cell);
     }
 
-    /// Lays the grid anew with cells of another size; the points stay. Those that are near in space are near in memory from
-    /// then on.
+    /// Lays out the grid again with cells of another size, keeping the points. Neighbours in space are then neighbours
+    /// in memory.
     pub fn resize_cells(&mut self, cell: f32) {
         let max = self.origin + self.cells.as_vec3a() * self.cell;
         self.lay(self.origin, max, cell);
@@ -87,8 +86,8 @@ impl PointGrid {
         self.ordered = self.points.len();
     }
 
-    /// Whether so many points have come since the last [`resize_cells`](Self::resize_cells) that it pays to lay the grid anew
-    /// with cells of the same size, for the sake of the order in memory alone.
+    /// Whether so many points were added since the last [`resize_cells`](Self::resize_cells) that another call with the
+    /// same size pays, just for the order in memory.
     pub fn is_scattered(&self) -> bool {
         self.points.len() > WORTH_ORDERING && self.points.len() > self.ordered + self.ordered / 2
     }
@@ -99,7 +98,7 @@ impl PointGrid {
             let along = |length: f32| (f64::from(length) / f64::from(cell) / f64::from(SIDE)).floor() + 1.0;
             along(size.x) * along(size.y) * along(size.z)
         };
-        // A cell below this is lost in the rounding of the coordinates.
+        // Smaller cells would be lost in the rounding of the coordinates.
         let smallest = (size.max_element().max(min.abs().max(max.abs()).max_element()) * 1e-6).max(f32::MIN_POSITIVE);
         let mut cell = if cell.is_finite() { cell.max(smallest) } else { size.max_element().max(smallest) };
         while bricks(cell) > MAX_BRICKS {
@@ -216,16 +215,16 @@ impl PointGrid {
         self.blocks[*head as usize].set(0, id, point);
     }
 
-    /// Where a point lies, in cells.
+    /// Position of a point, in cells.
     #[inline]
     fn local(&self, point: Vec3) -> Vec3A {
         (Vec3A::from(point) - self.origin) * self.inverse_cell
     }
 
-    /// The cell at a place, clamped to the box; no number is cell 0.
+    /// The cell at a position, clamped to the box; NaN gives cell 0.
     ///
-    /// Where a fraction begins is of no matter, as long as greater places never have lower cells. So the place is rounded,
-    /// for all three axes at once: added to 2²³ it is an integer that stands in the lowest bits.
+    /// Cells may begin at any fraction, as long as greater positions never have lower cells. So the position is
+    /// rounded, on all three axes at once: added to 2²³, it is an integer in the lowest bits.
     #[inline]
     fn cell_at(&self, local: Vec3A) -> UVec3 {
         let clamped = (local - 0.5).max(Vec3A::ZERO).min(self.last);
@@ -245,7 +244,7 @@ impl PointGrid {
         (self.cell_at(local - reach), self.cell_at(local + reach))
     }
 
-    /// Index of a cell's brick in the table, and of the cell in the brick.
+    /// Indices of a cell's brick in the table, and of the cell in the brick.
     #[inline]
     fn locate(&self, cell: UVec3) -> (usize, usize) {
         let brick = cell / SIDE;
@@ -257,7 +256,7 @@ impl PointGrid {
     }
 }
 
-/// From here on to its double every number is an integer.
+/// From this number to its double, every float is an integer.
 const INTEGERS: f32 = (1 << 23) as f32;
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
-//! What a grid of points is asked: whether anything is near, what is nearest, and what there is around a place.
+//! Queries of a point grid: whether any point is near, the nearest one, and all points around a position.
 
 use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::space::point_grid::brick::{CELLS, COLUMNS, EMPTY, LAYERS, ROWS, SIDE, range};
 use bevy_math::{BVec4A, UVec3, Vec3, Vec4};
 
-/// Questions that are asked at once.
+/// Queries processed at once.
 const BATCH: usize = 32;
 
 impl PointGrid {
@@ -39,8 +39,8 @@ impl PointGrid {
         }
     }
 
-    /// Visits the points within a radius that may shrink on the way: `visit(id, squared distance)` answers with the squared
-    /// radius from there on. The centre's own cell comes first, the others in no particular order.
+    /// Visits the points within a radius that may shrink on the way: `visit(id, squared distance)` returns the squared
+    /// radius from then on. The centre's own cell comes first, the others in no particular order.
     #[inline]
     fn scan(&self, center: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> f32) {
         if self.points.is_empty() {
@@ -92,12 +92,12 @@ impl PointGrid {
         found
     }
 
-    /// Whether a point lies within a squared radius of a centre, in the cells from `low` to `high`, no more than two along each
-    /// axis.
+    /// Whether a point lies within a squared radius of a centre, in the cells from `low` to `high`, at most two along
+    /// each axis.
     ///
-    /// All of them are looked at whatever is found: where a search may end at any time the processor guesses wrong so often
-    /// that this takes longer. What each axis adds to the indices of [`locate`](Self::locate) is found but once, which is a
-    /// good part of the work.
+    /// All of them are checked, whatever is found: a search that may end at any time causes so many branch
+    /// mispredictions that it takes longer. Each axis's part of the indices of [`locate`](Self::locate) is computed
+    /// only once, which saves a good part of the work.
     fn any_in_eight(&self, low: UVec3, high: UVec3, center: Vec3, limit: f32) -> bool {
         let is_one_layer = low.z == high.z;
         let [low, high] = [low, high].map(|cell| {
@@ -119,7 +119,8 @@ impl PointGrid {
         self.chains_reach([a, b, c, d, e, f, g, h], center, limit)
     }
 
-    /// Whether a point of some chains lies within a squared radius of a centre: the first blocks of all, then the second.
+    /// Whether a point of some chains lies within a squared radius of a centre. Checks all first blocks, then all
+    /// second ones.
     fn chains_reach<const N: usize>(&self, mut blocks: [u32; N], center: Vec3, limit: f32) -> bool {
         let limit = Vec4::splat(limit);
         loop {
@@ -134,11 +135,10 @@ impl PointGrid {
         }
     }
 
-    /// Marks those centres that have a point within `radius` in the first two blocks of their own cell: the quickest question,
-    /// and mostly enough in space that is filled. The others stay as they are.
+    /// Marks the centres that have a point within `radius` in the first two blocks of their own cell: the fastest
+    /// query, and usually enough in filled space. Other marks stay.
     ///
-    /// Questions are asked a step at a time for many centres, so that the processor waits for the memory of all of them at
-    /// once.
+    /// Each step is done for many centres, so that the processor waits for the memory of all of them at once.
     pub fn mark_beside(&self, centers: &[Vec3], radius: f32, marks: &mut [bool]) {
         let limit = Vec4::splat(radius * radius);
         let mut heads = [EMPTY; BATCH];
@@ -163,14 +163,14 @@ impl PointGrid {
         });
     }
 
-    /// The nearest point within `radius` that `accepts` its id, with its squared distance. Of several at one distance
-    /// the lowest id wins, whatever the order in which they were added.
+    /// The nearest point within `radius` that `accepts` its id, with its squared distance. At equal distance the lowest
+    /// id wins, in any order of insertion.
     pub fn nearest_within(&self, center: Vec3, radius: f32, accepts: impl Fn(u32) -> bool) -> Option<(u32, f32)> {
         self.nearest_two(center, radius, radius, accepts).0
     }
 
-    /// As [`nearest_within`](Self::nearest_within), and the squared distance of the nearest point of all within `reach`,
-    /// infinite where there is none. `reach` is not below `radius`.
+    /// As [`nearest_within`](Self::nearest_within), and the squared distance of the nearest of all points within
+    /// `reach`, infinite if there is none. `reach` is not below `radius`.
     pub fn nearest_two(
         &self,
         center: Vec3,

@@ -1,4 +1,4 @@
-//! Flat shapes, which are surfaces: disc and rectangle.
+//! Flat shapes: disc and rectangle, which are surfaces.
 
 use super::{in_unit_disc, signed, tolerance};
 use crate::synthesis::random::{VesselRng, many};
@@ -21,7 +21,7 @@ pub struct Disc {
 }
 
 impl Disc {
-    /// A disc around `center`, of any `normal` that is not zero.
+    /// A disc around `center`, with any nonzero `normal`.
     ///
     /// # Errors
     /// A coordinate that is not finite, a normal without direction, a radius that is not above 0.
@@ -71,7 +71,7 @@ impl Disc {
 
 impl Tissue for Disc {
     fn bounds(&self) -> Aabb3d {
-        // Along each axis a disc reaches as far as the sine of the angle between axis and normal says.
+        // Along each axis, a disc reaches its radius times the sine of the angle between axis and normal.
         let half = (Vec3::ONE - self.normal * self.normal).max(Vec3::ZERO).map(f32::sqrt) * self.radius;
         Aabb3d { min: (self.center - half).into(), max: (self.center + half).into() }
     }
@@ -155,7 +155,7 @@ pub struct Rectangle {
 const PERPENDICULAR: f32 = 1.0e-4;
 
 impl Rectangle {
-    /// A rectangle around `center`; `half_x` and `half_y` lead from there to the middles of two sides.
+    /// A rectangle around `center`; `half_x` and `half_y` go from there to the middles of two sides.
     ///
     /// Its normal is `half_x` × `half_y`.
     ///

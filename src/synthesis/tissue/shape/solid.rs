@@ -14,7 +14,7 @@ fn inside(position: Vec3) -> TissuePoint {
     TissuePoint { position, normal: Vec3::ZERO }
 }
 
-/// Appends points drawn evenly from the unit ball, each where `place` puts it.
+/// Appends points drawn uniformly from the unit ball, each mapped by `place`.
 fn draw_in_ball(rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>, place: impl Fn(Vec3) -> Vec3) {
     many::draw(rng, count, candidates, |words| {
         let point = Vec3::from(words.map(many::signed));
@@ -167,7 +167,7 @@ impl Tissue for Ellipsoid {
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
-        // A uniform ball stays uniform when it is stretched.
+        // A uniform distribution stays uniform when stretched.
         Some(self.center + in_unit_ball(rng)? * self.half)
     }
 
@@ -178,19 +178,19 @@ impl Tissue for Ellipsoid {
 
 /// The point of an ellipsoid around the origin that is nearest to a point outside it.
 ///
-/// It is x = e²·p / (t + e²) for the t that satisfies F(t) = Σ (e·p / (t + e²))² − 1 = 0 (Eberly, "Distance from a Point
-/// to an Ellipse, an Ellipsoid, or a Hyperellipsoid", 2013). Outside, t is above 0, where F falls and is convex, so that
-/// Newton's steps from below never overshoot.
+/// It is x = e²·p / (t + e²) for the t that satisfies F(t) = Σ (e·p / (t + e²))² − 1 = 0 (Eberly, "Distance from a
+/// Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid", 2013). Outside, t is above 0, where F is decreasing and
+/// convex, so Newton's steps from below never overshoot.
 fn nearest_on_ellipsoid(point: DVec3, half: DVec3) -> DVec3 {
     let squares = half * half;
-    // At this t one term alone is 1, so F is not below 0.
+    // At this t one term is already 1, so F is not below 0.
     let mut t = (half * point.abs() - squares).max_element().max(0.0);
     for _ in 0..100 {
         let ratios = half * point / (squares + t);
         let value = ratios.length_squared() - 1.0;
         let slope = -2.0 * (ratios * ratios / (squares + t)).element_sum();
         let next = t - value / slope;
-        // `next` is no number where the slope is 0: then nothing is gained either.
+        // `next` is NaN if the slope is 0: then nothing is gained either.
         let gains = next > t;
         if !gains {
             break;

@@ -1,9 +1,9 @@
 //! Reading an organ's mesh from a glTF 2.0 file, binary (`.glb`) or text (`.gltf`).
 //!
-//! The `gltf` crate decodes the JSON; the container and the data behind it are read here, where every offset and count is
-//! checked, so that a damaged file is an error.
+//! The `gltf` crate decodes the JSON. The container and its binary data are read here, with every offset and count
+//! checked, so that a damaged file gives an error.
 
-use super::load::{Fault, MeshReadError, read_bytes};
+use super::read::{Fault, MeshReadError, read_bytes};
 use crate::synthesis::mesh::{MAX_TRIANGLES, TriangleMesh};
 use bevy_math::{Mat4, Quat, Vec2, Vec3};
 use gltf::json::{
@@ -16,13 +16,13 @@ use gltf::json::{
 };
 use std::path::Path;
 
-/// Extensions that replace the data of a mesh by compressed data.
+/// Extensions that compress the data of a mesh.
 const COMPRESSIONS: [&str; 3] = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// Reads all triangles of a file's scene as one mesh, each placed by its node's transform.
 ///
-/// Read are triangle lists, strips and fans; positions as floats or quantised; the first set of texture coordinates, if
-/// every part has one; buffers within the file, as data URIs, or in files beside it. Points and lines are passed over.
+/// Supports triangle lists, strips and fans; positions as floats or quantised; the first set of texture coordinates, if
+/// every part has one; buffers within the file, as data URIs, or in separate files. Points and lines are ignored.
 ///
 /// # Errors
 /// [`MeshReadError`], which names the file and the cause.
@@ -138,7 +138,7 @@ fn decode_percent(uri: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Looks up what an index of the JSON refers to.
+/// Looks up the target of an index of the JSON.
 fn find<'a, T>(root: &'a Root, index: Index<T>, what: &str) -> Result<&'a T, Fault>
 where
     Root: Get<T>,
@@ -169,7 +169,7 @@ fn placed_meshes(root: &Root) -> Result<Vec<(Index<json::Mesh>, Mat4)>, Fault> {
     Ok(meshes)
 }
 
-/// The nodes that are no one's child.
+/// The nodes that are no child.
 fn top_nodes(root: &Root) -> Vec<Index<json::Node>> {
     let mut child = vec![false; root.nodes.len()];
     for index in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
@@ -191,7 +191,7 @@ fn local_transform(node: &json::Node) -> Mat4 {
     )
 }
 
-/// The mesh as it is put together.
+/// The mesh under construction.
 #[derive(Default)]
 struct Parts {
     positions: Vec<Vec3>,
@@ -239,11 +239,11 @@ impl Parts {
     }
 }
 
-/// The triangles that a list of vertices stands for.
+/// The triangles of a list of vertices.
 fn triangles(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::Triangles => indices.as_chunks().0.to_vec(),
-        // Every other triangle of a strip runs the other way.
+        // Every other triangle of a strip is reversed.
         Mode::TriangleStrip => indices
             .windows(3)
             .enumerate()
@@ -295,7 +295,7 @@ impl Source<'_> {
                 let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
                 self.elements(view, offset, count, N * component.size(), read)?
             }
-            // Without a view all values are zero, but for the sparse ones.
+            // Without a view all values are zero, except the sparse ones.
             None => vec![[0.0; N]; count],
         };
         if let Some(sparse) = &accessor.sparse {
@@ -366,7 +366,7 @@ fn shape(accessor: &Accessor) -> Result<(ComponentType, usize), Fault> {
     }
 }
 
-/// A component as a float: normalised as section 3.11 of the glTF 2.0 specification has it, or as it is.
+/// A component as a float: normalised by section 3.11 of the glTF 2.0 specification, or unchanged.
 fn component_value(component: ComponentType, normalized: bool, bytes: &[u8]) -> f32 {
     let (value, largest) = match (component, bytes) {
         (ComponentType::I8, &[a, ..]) => (f32::from(a as i8), 127.0),
@@ -375,7 +375,7 @@ fn component_value(component: ComponentType, normalized: bool, bytes: &[u8]) -> 
         (ComponentType::U16, &[a, b, ..]) => (f32::from(u16::from_le_bytes([a, b])), 65535.0),
         (ComponentType::U32, &[a, b, c, d, ..]) => (u32::from_le_bytes([a, b, c, d]) as f32, u32::MAX as f32),
         (ComponentType::F32, &[a, b, c, d, ..]) => return f32::from_le_bytes([a, b, c, d]),
-        // `elements` gives every reader the bytes it asked for.
+        // `elements` gives every reader the requested bytes.
         _ => return f32::NAN,
     };
     if normalized { (value / largest).max(-1.0) } else { value }
@@ -387,7 +387,7 @@ fn integer(component: ComponentType, bytes: &[u8]) -> u32 {
         (ComponentType::U8, &[a, ..]) => a.into(),
         (ComponentType::U16, &[a, b, ..]) => u16::from_le_bytes([a, b]).into(),
         (ComponentType::U32, &[a, b, c, d, ..]) => u32::from_le_bytes([a, b, c, d]),
-        // No index at all, which the caller refuses as out of range.
+        // Not a valid index: the caller refuses it as out of range.
         _ => u32::MAX,
     }
 }

@@ -1,4 +1,4 @@
-//! Files of every make that is read, and damaged ones.
+//! All supported variants of files, and damaged ones.
 
 use super::*;
 use crate::synthesis::mesh::MeshError;
@@ -110,7 +110,7 @@ fn damaged_files_are_errors() {
         for change in [1u8, 16, 128, 255] {
             let mut bent = whole.clone();
             bent[place] ^= change;
-            // It may still be a mesh; it must not be a panic.
+            // It may still be a mesh, but must not panic.
             let _ = read(&bent);
         }
     }

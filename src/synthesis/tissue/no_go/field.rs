@@ -1,18 +1,14 @@
-//! No-go regions: where no vessel may be, such as over a landmark that is to stay free.
+//! Where no vessel may be: regions, painted vertices and functions.
 
 use crate::synthesis::{
     mesh::IndexedMesh,
     pace::{Pace, at_once},
-    random::VesselRng,
-    tissue::{
-        Extent, Tissue, TissuePiece, TissuePoint,
-        error::{TissueError, finite_point, positive},
-    },
+    tissue::error::{TissueError, finite_point, positive},
 };
-use bevy_math::{Vec3, bounding::Aabb3d};
+use bevy_math::Vec3;
 use std::{fmt, sync::Arc};
 
-/// Share of a triangle's painted corners from which on a point of it is forbidden.
+/// Interpolated share of painted corners from which a point of a triangle is forbidden.
 const HALF: f32 = 0.5;
 
 /// A part of space in which no vessel may be. Its boundary belongs to it.
@@ -67,7 +63,7 @@ impl NoGoRegion {
     }
 }
 
-/// Where no vessel may be, at every point. A clone shares what the field was made of.
+/// Tells for every point whether vessels are forbidden. A clone shares its data.
 #[derive(Clone)]
 pub struct NoGoField(Vec<Part>);
 
@@ -83,23 +79,23 @@ enum Part {
 }
 
 impl NoGoField {
-    /// A field given by a function, for determinism's sake one that always says the same of the same point.
+    /// A field given by a function. For determinism, it must always give the same result for the same point.
     pub fn function(forbids: impl Fn(Vec3) -> bool + Send + Sync + 'static) -> Self {
         Self(vec![Part::Function(Arc::new(forbids))])
     }
 
-    /// A field painted on a mesh, one entry per vertex. Within a triangle, what is nearer to its painted corners is
-    /// forbidden: the side of the line on which the painted share is at least a half. Away from the mesh its nearest point
-    /// counts, so that what lies below painted surface is forbidden, too.
+    /// A field painted on a mesh, one entry per vertex. Within a triangle, points whose interpolated painted share is
+    /// at least a half are forbidden. Away from the mesh, its nearest point decides, so tissue below painted surface is
+    /// forbidden, too.
     ///
     /// # Errors
-    /// Entries that are not one per vertex.
+    /// A number of entries other than one per vertex.
     pub fn on_vertices(mesh: &IndexedMesh, painted: &[bool]) -> Result<Self, TissueError> {
         at_once(Self::on_vertices_paced(mesh, painted, &Pace::default()))
     }
 
     /// The same, with rests.
-    pub(super) async fn on_vertices_paced(
+    pub(in crate::synthesis::tissue) async fn on_vertices_paced(
         mesh: &IndexedMesh,
         painted: &[bool],
         pace: &Pace,
@@ -120,7 +116,7 @@ impl NoGoField {
         regions.into_iter().map(|region| region.check().map(Part::Region)).collect::<Result<_, _>>().map(Self)
     }
 
-    /// The field that forbids what either of two forbids.
+    /// The field that forbids all points that either of two forbids.
     #[must_use]
     pub fn or(mut self, other: Self) -> Self {
         self.0.extend(other.0);
@@ -150,88 +146,5 @@ impl fmt::Debug for Part {
             Self::Vertices { values, .. } => write!(f, "Vertices({})", values.len()),
             Self::Region(region) => region.fmt(f),
         }
-    }
-}
-
-/// A tissue with no-go regions.
-///
-/// Its shape stays what it is, and so does its extent; but no sample falls into the regions, and generators
-/// [place no node there](Tissue::no_go).
-#[derive(Clone, Debug)]
-pub struct NoGoTissue {
-    tissue: Arc<dyn Tissue>,
-    field: NoGoField,
-}
-
-impl NoGoTissue {
-    /// Lays a field over a tissue. What the tissue forbids already stays forbidden.
-    ///
-    /// # Errors
-    /// A tissue that changes in stages: lay the field over its stages instead.
-    pub fn new(tissue: Arc<dyn Tissue>, field: NoGoField) -> Result<Self, TissueError> {
-        if tissue.stage(1).is_some() {
-            return Err(TissueError::NoGoOverStages);
-        }
-        let field = match tissue.no_go() {
-            Some(before) => before.clone().or(field),
-            None => field,
-        };
-        Ok(Self { tissue, field })
-    }
-
-    fn allowed(&self, point: Option<Vec3>) -> Option<Vec3> {
-        point.filter(|&point| !self.field.forbids(point))
-    }
-}
-
-impl Tissue for NoGoTissue {
-    fn bounds(&self) -> Aabb3d {
-        self.tissue.bounds()
-    }
-
-    fn extent(&self) -> Extent {
-        self.tissue.extent()
-    }
-
-    fn contains(&self, point: Vec3) -> bool {
-        self.tissue.contains(point)
-    }
-
-    fn closest_point(&self, point: Vec3) -> TissuePoint {
-        self.tissue.closest_point(point)
-    }
-
-    fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
-        let point = self.tissue.sample(rng);
-        self.allowed(point)
-    }
-
-    fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
-        let first = candidates.len();
-        let mut kept = first;
-        self.tissue.draw(rng, count, candidates);
-        for index in first..candidates.len() {
-            if !self.field.forbids(candidates[index]) {
-                candidates[kept] = candidates[index];
-                kept += 1;
-            }
-        }
-        candidates.truncate(kept);
-    }
-
-    fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
-        self.tissue.cut(reach, pieces)
-    }
-
-    fn point_of(&self, reach: f32, piece: [u32; 2], numbers: [f32; 3]) -> Option<Vec3> {
-        self.allowed(self.tissue.point_of(reach, piece, numbers))
-    }
-
-    fn entrance(&self) -> Option<Vec3> {
-        self.allowed(self.tissue.entrance())
-    }
-
-    fn no_go(&self) -> Option<&NoGoField> {
-        Some(&self.field)
     }
 }
