@@ -110,17 +110,19 @@ fn shown(value: &dyn Debug) -> u64 {
 }
 
 /// A tissue, hashed also by its behaviour, since `Debug` of paint fields doesn't show all their data.
-fn deeds(tissue: &Arc<dyn Tissue>) -> impl Debug + use<> {
+fn deeds(tissue: Result<Arc<dyn Tissue>, TissueError>) -> u64 {
+    let tissue = tissue.expect("a tissue");
     let mut rng = Stream::Attraction.rng(5);
     let points: Vec<_> = (0..500).map(|_| tissue.sample(&mut rng)).collect();
     let near: Vec<_> = points.iter().flatten().map(|&point| tissue.closest_point(1.1 * point).position).collect();
     let forbidden: Vec<_> = near.iter().map(|&point| tissue.no_go().map(|field| field.forbids(point))).collect();
-    (shown(tissue), points, near, forbidden)
+    shown(&(&tissue, points, near, forbidden))
 }
 
 /// The record of work that was polled until it was done.
 struct Walk {
-    shown: u64,
+    /// Shows the result.
+    shown: Box<dyn FnOnce() -> u64>,
     /// Pauses.
     pauses: usize,
     /// The longest CPU time of this thread between two pauses, and the total.
@@ -129,26 +131,29 @@ struct Walk {
 }
 
 /// Polls work to its end, and checks its progress.
-fn walk<T: Debug>(name: &str, pace: &Pace, work: impl Future<Output = T>) -> Walk {
+fn walk<T: Debug + 'static>(name: &str, pace: &Pace, work: impl Future<Output = T>) -> Walk {
+    walk_to(name, pace, work, |result| shown(&result))
+}
+
+fn walk_to<T: 'static>(name: &str, pace: &Pace, work: impl Future<Output = T>, show: fn(T) -> u64) -> Walk {
     let mut work = pin!(work);
-    let mut walk = Walk { shown: 0, pauses: 0, longest: Duration::ZERO, total: Duration::ZERO };
+    let (mut pauses, mut longest, mut total) = (0, Duration::ZERO, Duration::ZERO);
     let mut last = 0.0;
     loop {
         let start = ThreadTime::now();
         let polled = work.as_mut().poll(&mut Context::from_waker(Waker::noop()));
         let time = start.elapsed();
-        walk.longest = walk.longest.max(time);
-        walk.total += time;
+        longest = longest.max(time);
+        total += time;
         let progress = pace.progress();
         assert!((last..=1.0).contains(&progress), "{name}: {progress} after {last}");
         last = progress;
         let Poll::Ready(result) = polled else {
-            walk.pauses += 1;
+            pauses += 1;
             continue;
         };
         assert_eq!(progress, 1.0, "{name}: progress at its end");
-        walk.shown = shown(&result);
-        return walk;
+        return Walk { shown: Box::new(move || show(result)), pauses, longest, total };
     }
 }
 
@@ -166,7 +171,10 @@ struct Case {
 macro_rules! case {
     ($name:literal, $items:expr, [$($held:ident),*], $unpaced:expr, |$pace:ident| $paced:expr) => {{
         let unpaced = { $(let $held = $held.clone();)* move || shown(&$unpaced) };
-        let paced = { $(let $held = $held.clone();)* move |$pace: &Pace| walk($name, $pace, async { $paced }) };
+        let paced = {
+            $(let $held = $held.clone();)*
+            move |$pace: &Pace| { $(let $held = $held.clone();)* walk($name, $pace, async move { $paced }) }
+        };
         Case { name: $name, items: $items, unpaced: Box::new(unpaced), paced: Box::new(paced) }
     }};
 }
@@ -182,7 +190,7 @@ fn meshes(rings: u32) -> Vec<Case> {
             count,
             [positions, triangles],
             TriangleMesh::new(positions.clone(), triangles.clone(), None),
-            |pace| TriangleMesh::new_paced(positions.clone(), triangles.clone(), None, pace).await
+            |pace| TriangleMesh::new_paced(positions, triangles, None, pace).await
         ),
         case!("TriangleIndex", 4 * count, [mesh], TriangleIndex::new(&mesh), |pace| {
             TriangleIndex::new_paced(&mesh, pace).await
@@ -199,8 +207,7 @@ fn tissues(rings: u32) -> Vec<Case> {
     let mesh = ball(rings);
     let count = mesh.triangles().len();
     let inward = Arc::new(TriangleMesh::clone(&mesh).with_flipped(|_| true));
-    let size = 4 * rings;
-    let (flat, deep) = (UVec2::splat(4 * size), UVec3::splat(size / 2));
+    let (flat, deep) = (UVec2::splat(4 * rings), UVec3::splat(rings / 2));
     let set = |count: u32| -> Vec<bool> { (0..count).map(|cell| cell % 7 > 2).collect() };
     let (pixels, voxels) = (set(flat.element_product()), set(deep.element_product()));
     let values = (0..flat.element_product()).map(|cell| (cell % 97) as f32 / 97.0).collect();
@@ -268,18 +275,21 @@ fn paints(rings: u32) -> Vec<Case> {
             let (mesh, paint) = (mesh.clone(), paint.clone());
             // Made again each time, since later paint reuses the index of the first.
             let prepare = move || MeshTissue { mode, resolution: 24 }.prepare(mesh.clone()).expect("a tissue");
-            let case =
-                case!("painted", items, [prepare, paint], deeds(&prepare().painted(&paint).expect("paint")), |pace| {
-                    let prepared = prepare();
-                    deeds(&prepared.painted_paced(&paint, pace).await.expect("paint"))
-                });
-            cases.push(Case { name, ..case });
+            let unpaced = {
+                let (prepare, paint) = (prepare.clone(), paint.clone());
+                move || deeds(prepare().painted(&paint))
+            };
+            let paced = move |pace: &Pace| {
+                let prepared = prepare();
+                walk_to(name, pace, prepared.painted_paced(&paint, pace), deeds)
+            };
+            cases.push(Case { name, items, unpaced: Box::new(unpaced), paced: Box::new(paced) });
         }
     }
     let surface: Arc<dyn Tissue> = Arc::new(MeshSurface::new(mesh).expect("a surface"));
     let guide = GuidePath::new(line, 0.1).expect("a guide");
     cases.push(case!("GuidePath", STRETCH, [guide, surface], guide.clone().over(surface.clone()), |pace| {
-        guide.clone().over_paced(surface.clone(), pace).await
+        guide.over_paced(surface, pace).await
     }));
     cases
 }
@@ -316,7 +326,7 @@ fn products(nodes: usize) -> Vec<Case> {
                 (network.solve(), network)
             },
             |pace| {
-                let mut network = unsolved.clone();
+                let mut network = unsolved;
                 (network.solve_paced(pace).await, network)
             }
         ),
@@ -325,7 +335,7 @@ fn products(nodes: usize) -> Vec<Case> {
             nodes,
             [arteries, veins, links],
             Circulation::new(arteries.clone(), veins.clone(), &links),
-            |pace| Circulation::new_paced(arteries.clone(), veins.clone(), &links, pace).await
+            |pace| Circulation::new_paced(arteries, veins, &links, pace).await
         ),
         case!(
             "Circulation solved",
@@ -336,7 +346,7 @@ fn products(nodes: usize) -> Vec<Case> {
                 (joined.solve(), joined)
             },
             |pace| {
-                let mut joined = joined.clone();
+                let mut joined = joined;
                 (joined.solve_paced(pace).await, joined)
             }
         ),
@@ -353,7 +363,7 @@ fn products(nodes: usize) -> Vec<Case> {
                 supply
             },
             |pace| {
-                let mut supply = supply.clone();
+                let mut supply = supply;
                 supply.update_paced(&artery, &solved, pace).await;
                 supply
             }
@@ -371,14 +381,14 @@ fn cases(size: u32) -> impl Iterator<Item = Case> {
 
 #[test]
 fn the_same_comes_out_with_any_pauses() {
-    for case in cases(32) {
+    for case in cases(24) {
         let expected = (case.unpaced)();
         let every = |rest: usize| {
             let rests = AtomicUsize::new(0);
             Pace::new(move || (rests.fetch_add(1, Ordering::Relaxed) + 1).is_multiple_of(rest))
         };
         for pace in [every(1), every(7), Pace::new(|| false)] {
-            assert_eq!((case.paced)(&pace).shown, expected, "{}", case.name);
+            assert_eq!(((case.paced)(&pace).shown)(), expected, "{}", case.name);
         }
     }
 }
@@ -394,10 +404,13 @@ fn there_is_a_rest_for_every_stretch_of_items() {
 /// Each time is the least of several runs, to exclude other processes.
 #[test]
 fn no_stretch_is_a_large_part_of_the_work() {
-    for case in cases(128).filter(|case| case.items > 0) {
+    /// What a stretch may take however little there is to do: more than any does on a slow machine.
+    const ROOM: Duration = Duration::from_millis(4);
+    for case in cases(128) {
         let walks = [0; 3].map(|_| (case.paced)(&Pace::new(|| true)));
         let longest = walks.iter().map(|walk| walk.longest).min().unwrap_or_default();
         let total = walks.iter().map(|walk| walk.total).min().unwrap_or_default();
         println!("{:24} {:5} pauses, longest {longest:?} of {total:?}", case.name, walks[0].pauses);
+        assert!(longest < ROOM + total / 20, "{}: {longest:?} of {total:?}", case.name);
     }
 }

@@ -251,8 +251,7 @@ fn settings_that_cannot_be_are_named_and_can_be_mended() {
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
     assert_eq!(loss(app.world(), organ).total, Volume::ZERO);
     app.world_mut().get_mut::<Perfusion>(organ).unwrap().discharge_coefficient = 0.29;
-    app.update();
-    assert_eq!(loss(app.world(), organ).bleeding_ends, 2);
+    run_until(&mut app, "blood", |world| loss(world, organ).bleeding_ends == 2);
 }
 
 #[test]

@@ -157,8 +157,10 @@ fn grow_outside(app: &mut App, organ: Entity, forbids: impl Fn(Vec3) -> bool) {
 
 #[test]
 fn nothing_grows_in_no_go_regions_of_surfaces_and_volumes() {
-    for mode in [TissueMode::Surface, TissueMode::Volume, TissueMode::Staged { surface_steps: 12 }] {
-        let wish = quick().with_tissue(MeshTissue { mode, resolution: 20 });
+    let staged = TissueMode::Staged { surface_steps: 45 };
+    for (mode, steps) in [(TissueMode::Surface, STEPS), (TissueMode::Volume, STEPS), (staged, 60)] {
+        let mut wish = quick().with_tissue(MeshTissue { mode, resolution: 20 });
+        settings_of(&mut wish).steps = steps;
         let mut app = headless(GrowthBudget::Steps(1));
         let organ = spawn(&mut app, wish);
         run_to_phase(&mut app, organ, GrowthPhase::Finished);

@@ -21,7 +21,7 @@ const SIDE: u32 = 48;
 
 /// An app with image assets.
 fn app() -> App {
-    let mut app = headless(GrowthBudget::Steps(50));
+    let mut app = headless(GrowthBudget::Steps(10));
     app.init_asset::<Image>();
     app
 }

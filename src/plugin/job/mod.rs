@@ -76,7 +76,7 @@ impl Jobs<'_> {
 
     /// Whether work on so many items is done at once.
     pub(crate) fn is_small(&self, items: usize) -> bool {
-        items <= self.at_once()
+        items <= self.at_once() && self.at_once() > 0
     }
 
     /// Starts work on about so many items. If they are few, it is done when this returns.

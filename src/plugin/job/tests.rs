@@ -120,6 +120,14 @@ fn little_work_is_done_when_it_has_begun_and_more_waits_for_frames() {
 }
 
 #[test]
+fn nothing_is_done_at_once_where_no_item_may_be() {
+    let mut world = world(SLICES);
+    let job = start(&mut world, 0, |pace| sum(Arc::default(), pace));
+    assert_eq!(job.as_ref().map(Job::is_done), Some(false));
+    assert!(result(&mut world, job).is_ok());
+}
+
+#[test]
 fn auto_means_the_task_pool_where_there_are_threads() {
     assert_eq!(JobMode::Auto.is_sliced(), cfg!(target_arch = "wasm32"));
     assert!(JobMode::Slices.is_sliced() && !JobMode::TaskPool.is_sliced());

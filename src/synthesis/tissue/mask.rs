@@ -172,8 +172,14 @@ impl Mask {
     /// Runs of set cells along x, and the box around all of them.
     async fn list_runs(&self, pace: &Pace) -> (Vec<Bounds>, Bounds) {
         let mut bounds = Bounds::EMPTY;
-        let (mut runs, mut stretch, mut done) = (Vec::new(), Stretch::default(), 0);
-        for run in self.set.chunk_by(|&a, &b| b == a + 1 && !(b as usize).is_multiple_of(self.size[0])) {
+        let goes_on = |a: u32, b: u32| b == a + 1 && !(b as usize).is_multiple_of(self.size[0]);
+        // Room for all, since a list that outgrows its room is copied without a rest.
+        let mut count = 1;
+        let compare = |pair: usize| count += usize::from(!goes_on(self.set[pair], self.set[pair + 1]));
+        pace.part(0.0..0.3).each(self.set.len() - 1, compare).await;
+        let pace = pace.part(0.3..1.0);
+        let (mut runs, mut stretch, mut done) = (Vec::with_capacity(count), Stretch::default(), 0);
+        for run in self.set.chunk_by(|&a, &b| goes_on(a, b)) {
             let min = self.corner(run[0] as usize, Vec3::ZERO);
             let max = self.corner(run[run.len() - 1] as usize, Vec3::ONE);
             let run_bounds = Bounds { min: min.into(), max: max.into() };

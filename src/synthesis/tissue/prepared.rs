@@ -97,6 +97,7 @@ impl PreparedTissue {
     /// Those of [`painted`](Self::painted).
     pub async fn painted_paced(&self, paint: &TissuePaint, pace: &Pace) -> Result<Arc<dyn Tissue>, TissueError> {
         if paint.is_blank() {
+            pace.rest(1.0).await;
             return Ok(Arc::clone(&self.plain));
         }
         if let (Some(canvas), true) = (&self.canvas, paint.is_on_vertices()) {

@@ -52,14 +52,16 @@ impl TissueSource {
     /// # Errors
     /// Those of [`prepare`](Self::prepare).
     pub async fn prepare_paced(&self, data: &SourceData, pace: &Pace) -> Result<PreparedTissue, TissueError> {
-        match self {
+        let prepared = match self {
             Self::Mesh(mesh) => mesh.prepare_paced(data.mesh.clone().ok_or(TissueError::NoMesh)?, pace).await,
             Self::Shape(shape) => PreparedTissue::new(shape.build()?),
             Self::Image(image) => {
                 let mask = image.mask_paced(data.image.as_deref().ok_or(TissueError::NoImage)?, pace).await?;
                 PreparedTissue::new(Arc::new(mask))
             }
-        }
+        };
+        pace.rest(1.0).await;
+        prepared
     }
 
     /// Work of [preparing](Self::prepare) the tissue of so many triangles, or pixels of an image, in items.
