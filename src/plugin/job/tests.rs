@@ -11,7 +11,7 @@ use bevy::ecs::{
 use std::{
     sync::{Mutex, PoisonError, atomic::AtomicUsize},
     thread,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 /// Items of the work in these tests, and of a stretch of it.
