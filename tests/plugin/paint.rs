@@ -390,7 +390,7 @@ fn vertices_of_an_organ_without_a_mesh_cannot_be_painted() {
 #[test]
 fn a_stroke_on_a_large_organ_holds_up_no_frame() {
     let wish = quick().with_tissue(MeshTissue { mode: TissueMode::Volume, resolution: 16 });
-    let mesh = || Mesh::from(Sphere::new(0.5).mesh().uv(160, 90));
+    let mesh = || Sphere::new(0.5).mesh().uv(160, 90);
     let count = mesh().count_vertices();
     let density = (0..count).map(|vertex| (vertex % 2) as f32).collect();
     let stroke = TissuePaint { density: Some(density), ..guided() };
