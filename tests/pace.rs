@@ -1,4 +1,4 @@
-//! Work with rests: with any pauses the same as without, with progress that rises to its end, and never long without a rest.
+//! Work with rests: equal results with any pauses, progress that rises to its end, and no long stretch without a rest.
 
 use bevy_math::{UVec2, UVec3, Vec2, Vec3};
 use bevy_vessels::synthesis::{
@@ -25,7 +25,7 @@ use std::{
     time::Duration,
 };
 
-/// Items of a stretch, where they are light.
+/// Items of a stretch, if they are light.
 const STRETCH: usize = 1024;
 
 /// A ball of radius 1 with a seam, of 4 · `rings`² triangles.
@@ -92,7 +92,7 @@ fn circulation(nodes: usize) -> (Network, Network, Vec<BedLink>) {
     (network(&arteries), network(&veins), links)
 }
 
-/// A hash of what `Debug` shows, which is all fields, numbers to the last bit.
+/// A hash of the `Debug` output, which has all fields, with numbers to the last bit.
 #[derive(Debug)]
 struct Shown(u64);
 
@@ -109,7 +109,7 @@ fn shown(value: &dyn Debug) -> u64 {
     shown.0
 }
 
-/// A tissue, and what it does: fields of paint show less of themselves than they hold.
+/// A tissue, hashed also by its behaviour, since `Debug` of paint fields doesn't show all their data.
 fn deeds(tissue: Result<Arc<dyn Tissue>, TissueError>) -> u64 {
     let tissue = tissue.expect("a tissue");
     let mut rng = Stream::Attraction.rng(5);
@@ -119,18 +119,18 @@ fn deeds(tissue: Result<Arc<dyn Tissue>, TissueError>) -> u64 {
     shown(&(&tissue, points, near, forbidden))
 }
 
-/// What came of work that was polled until it was done.
+/// The record of work that was polled until it was done.
 struct Walk {
     /// Shows the result.
     shown: Box<dyn FnOnce() -> u64>,
     /// Pauses.
     pauses: usize,
-    /// The longest time of this thread from one pause to the next, and all of it.
+    /// The longest CPU time of this thread between two pauses, and the total.
     longest: Duration,
     total: Duration,
 }
 
-/// Goes through work, and checks what it tells on the way.
+/// Polls work to its end, and checks its progress.
 fn walk<T: Debug + 'static>(name: &str, pace: &Pace, work: impl Future<Output = T>) -> Walk {
     walk_to(name, pace, work, |result| shown(&result))
 }
@@ -160,14 +160,14 @@ fn walk_to<T: 'static>(name: &str, pace: &Pace, work: impl Future<Output = T>, s
 /// A builder of something.
 struct Case {
     name: &'static str,
-    /// The least number of light items that it goes through.
+    /// The least number of light items that it processes.
     items: usize,
-    /// What it makes without a rest.
+    /// Its result without rests.
     unpaced: Box<dyn Fn() -> u64>,
     paced: Box<dyn Fn(&Pace) -> Walk>,
 }
 
-/// A case, given both ways to make the same. What a builder takes by value is copied before it begins.
+/// A case, from both forms of a builder.
 macro_rules! case {
     ($name:literal, $items:expr, [$($held:ident),*], $unpaced:expr, |$pace:ident| $paced:expr) => {{
         let unpaced = { $(let $held = $held.clone();)* move || shown(&$unpaced) };
@@ -273,7 +273,7 @@ fn paints(rings: u32) -> Vec<Case> {
     for mode in [TissueMode::Surface, TissueMode::Volume, TissueMode::Staged { surface_steps: 9 }] {
         for (name, items, paint) in [("blank", 0, &blank), ("painted", 2 * count, &all), ("guided", STRETCH, &guides)] {
             let (mesh, paint) = (mesh.clone(), paint.clone());
-            // Anew each time: what is indexed for the first paint serves those that follow.
+            // Made again each time, since later paint reuses the index of the first.
             let prepare = move || MeshTissue { mode, resolution: 24 }.prepare(mesh.clone()).expect("a tissue");
             let unpaced = {
                 let (prepare, paint) = (prepare.clone(), paint.clone());
@@ -401,7 +401,7 @@ fn there_is_a_rest_for_every_stretch_of_items() {
     }
 }
 
-/// Of several walks the shortest counts, so that what other processes took is not in it.
+/// Each time is the least of several runs, to exclude other processes.
 #[test]
 fn no_stretch_is_a_large_part_of_the_work() {
     /// What a stretch may take however little there is to do: more than any does on a slow machine.

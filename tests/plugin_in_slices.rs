@@ -1,4 +1,4 @@
-//! The tests of the plugin once more, with all jobs done in slices, as in a browser.
+//! The tests of the plugin, repeated with all jobs in slices, as in a browser.
 
 #[path = "plugin/main.rs"]
 mod plugin;

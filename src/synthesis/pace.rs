@@ -49,7 +49,7 @@ pub struct Pace {
     part: Part,
 }
 
-/// A part of the whole work, from one share of it to another.
+/// A part of the whole work, given by its shares at start and end.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     from: f32,
@@ -63,8 +63,8 @@ impl Default for Part {
 }
 
 impl Part {
-    /// Which share of the whole work is done when this one of the part is. Exactly the part's end at its end, so that parts of
-    /// parts end there, too.
+    /// The share of the whole work that is done at a share of the part. At the part's end it is exactly the part's end,
+    /// also for nested parts.
     fn at(self, share: f32) -> f32 {
         if share >= 1.0 { self.to } else { self.from + (self.to - self.from) * share.max(0.0) }
     }
@@ -257,8 +257,8 @@ mod tests {
         (0..count as u32).map(|number| number.wrapping_mul(2_654_435_761) >> 20).collect()
     }
 
-    /// Does work that pauses at every rest, and gives its result, how many rests there were, and the most items that it
-    /// counted between two of them.
+    /// Does work that pauses at every rest. Returns its result, the number of rests, and the most items counted between
+    /// two of them.
     fn measured<T, W: Future<Output = T>>(work: impl FnOnce(Pace, Arc<AtomicUsize>) -> W) -> (T, usize, usize) {
         let [count, longest, rests] = [0; 3].map(|_| Arc::<AtomicUsize>::default());
         let pace = Pace::new({
@@ -356,7 +356,7 @@ mod tests {
             COMPARISONS.set(0);
             at_once(pace.sort(&mut list));
             assert!(list.iter().map(|counted| counted.0).eq(expected), "{count}");
-            // A run is sorted at once, by about n log₂ n comparisons.
+            // A run is sorted without rests, by about n log₂ n comparisons.
             let most = 2 * RUN * RUN.ilog2() as usize;
             assert!(longest.load(Ordering::Relaxed) <= most, "{count}: {longest:?} comparisons");
             assert_eq!(pace.progress(), 1.0, "{count}");

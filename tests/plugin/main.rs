@@ -1,8 +1,8 @@
 //! The plugin in headless apps: no window, no renderer, no graphics card.
 //!
-//! These tests are built twice. In the target `plugin` small work is done at once and large work in the task pool, as on a
-//! desktop. In `plugin_in_slices` all work is done in slices, as in a browser. What comes out must be the same, so no test
-//! may count on a job being done within the frame in which it begins.
+//! These tests are built twice. In the target `plugin` small work is done at once and large work in the task pool, as
+//! on a desktop. In `plugin_in_slices` all work is done in slices, as in a browser. The results must be the same, so no
+//! test may rely on a job being done in the frame in which it begins.
 
 mod budget;
 mod changes;

@@ -1,4 +1,4 @@
-//! Paint on organs: what it makes grow, and that a stroke neither prepares a tissue again nor takes vessels away.
+//! Paint on organs: its effect on growth, and that a stroke neither prepares a tissue again nor removes vessels.
 
 use super::errors::failure;
 use super::*;
@@ -14,7 +14,7 @@ use bevy_vessels::{
 };
 use std::{any::Any, ptr};
 
-/// Where nothing may grow in these tests: a ball around a point of the organ, whose radius is 0.5.
+/// The no-go region of these tests: a ball around a point of the organ, whose radius is 0.5.
 const REGION: NoGoRegion = NoGoRegion::Ball { center: Vec3::new(0.5, 0.0, 0.0), radius: 0.25 };
 
 fn forbidden() -> TissuePaint {
@@ -51,7 +51,7 @@ fn paint(app: &mut App, organ: Entity, paint: TissuePaint) {
     app.world_mut().entity_mut(organ).insert(OrganPaint(paint));
 }
 
-/// What an organ that was painted before it grew comes to.
+/// The result for an organ that was painted before it grew.
 fn painted_from_the_start(wish: Vasculature, paint: TissuePaint) -> [VesselTree; 2] {
     let mut app = headless(GrowthBudget::Steps(1000));
     let organ = spawn_with(&mut app, wish, paint);
@@ -63,8 +63,8 @@ fn hash(world: &World, organ: Entity) -> u64 {
     hash_trees(&trees(world, organ))
 }
 
-/// Runs frames until the successors are in their place. Meanwhile what is drawn stays, on the same entities, and no tissue
-/// is prepared.
+/// Runs frames until the successors have taken over. Meanwhile the drawn vessels stay, on the same entities, and no
+/// tissue is prepared.
 #[track_caller]
 fn regrow(app: &mut App, organ: Entity) {
     let before = trees(app.world(), organ);
@@ -87,7 +87,7 @@ fn regrow(app: &mut App, organ: Entity) {
     assert_published(app.world(), organ);
 }
 
-/// Address of the tissue that is grown on.
+/// Address of the tissue of the growth.
 fn tissue(world: &World, organ: Entity) -> *const () {
     let state = world.get::<GrowthState>(organ).expect("an organ has a state");
     state.tissue().map_or(ptr::null(), |tissue: &dyn Tissue| ptr::from_ref(tissue).cast())
@@ -108,7 +108,7 @@ fn a_stroke_leaves_tissue_and_vessels_until_others_have_grown() {
         run_to_phase(&mut app, organ, GrowthPhase::Finished);
         assert_eq!(trees(app.world(), organ), painted_from_the_start(quick(), stroke), "as if painted before");
     }
-    // The same address, since the tissue has been there all along.
+    // The same address, since the tissue was kept.
     app.world_mut().entity_mut(organ).remove::<OrganPaint>();
     regrow(&mut app, organ);
     run_to_phase(&mut app, organ, GrowthPhase::Finished);
@@ -133,7 +133,7 @@ fn paint_that_changes_nothing_starts_nothing() {
     assert_eq!((progress(app.world(), organ).phase, progress(app.world(), organ).step), (GrowthPhase::Growing, 5));
 }
 
-/// Asserts that no node and no drain of a growth is where it is forbidden.
+/// Asserts that no node and no drain of a growth is at a forbidden point.
 #[track_caller]
 fn assert_outside(growth: &dyn Growth, forbids: &dyn Fn(Vec3) -> bool) {
     let colonization = (growth as &dyn Any).downcast_ref::<Colonization>().expect("presets colonize");
@@ -144,7 +144,7 @@ fn assert_outside(growth: &dyn Growth, forbids: &dyn Fn(Vec3) -> bool) {
     }
 }
 
-/// Steps through a growth, and asserts after each that nothing is where it is forbidden.
+/// Steps through a growth, and asserts after each step that nothing is at a forbidden point.
 fn grow_outside(app: &mut App, organ: Entity, forbids: impl Fn(Vec3) -> bool) {
     run_until(app, "the end", |world| {
         let state = world.get::<GrowthState>(organ).expect("an organ has a state");
@@ -171,7 +171,7 @@ fn nothing_grows_in_no_go_regions_of_surfaces_and_volumes() {
         assert_eq!(progress(app.world(), organ).phase, GrowthPhase::Regrowing);
         grow_outside(&mut app, organ, |point| REGION.contains(point));
         assert!(trees(app.world(), organ).iter().all(|tree| tree.len() > 50), "{mode:?}: the rest is supplied");
-        // What is nearest to a painted vertex is forbidden, too; an edge is 0.1 long.
+        // Points nearest to a painted vertex are forbidden, too; an edge is 0.1 long.
         let vertices = vertices().iter().map(|&vertex| REGION.contains(vertex)).collect();
         let no_go = NoGo { vertices: Some(vertices), ..NoGo::default() };
         paint(&mut app, organ, TissuePaint { no_go, ..TissuePaint::default() });
@@ -287,12 +287,12 @@ fn strokes_while_the_tissue_is_prepared_are_laid_when_it_is_there() {
     assert_eq!(trees(app.world(), organ), painted_from_the_start(quick(), half()));
 }
 
-/// A bad stroke that is mended before it is looked at has done no harm.
+/// A bad stroke that is corrected before its failure is noticed does no harm.
 #[test]
 fn a_bad_stroke_that_is_followed_by_a_good_one_fails_nothing() {
     let (bad, ..) = bad_paints().remove(0);
     for has_grown in [false, true] {
-        // The bad stroke is laid beside the frames, so that the good one comes before its failure does.
+        // A job lays the bad stroke, so the good one comes before its failure.
         let mut app = headless(GrowthBudget::Steps(10));
         app.insert_resource(JobSettings { mode: JobMode::Slices, at_once: 0, slice_time: Duration::ZERO });
         let organ = spawn(&mut app, quick());
@@ -330,7 +330,7 @@ fn a_stroke_that_is_taken_back_leaves_the_vessels_as_they_are() {
     }
 }
 
-/// Paint that cannot be laid, and what is said of it: the value, and the remedy.
+/// Invalid paint, and its error: the value, and the remedy.
 fn bad_paints() -> Vec<(TissuePaint, &'static str, &'static str)> {
     let count = vertices().len();
     let density = |values: Vec<f32>| TissuePaint { density: Some(values), ..TissuePaint::default() };
@@ -412,7 +412,7 @@ fn vertices_of_an_organ_without_a_mesh_cannot_be_painted() {
     assert!(trees(app.world(), organ)[0].positions().iter().all(|&node| !REGION.contains(node)));
 }
 
-/// A large tissue is painted a little in each frame, and what comes of it is the same.
+/// A large tissue is painted a little in each frame, with the same result.
 #[test]
 fn a_stroke_on_a_large_organ_holds_up_no_frame() {
     let wish = quick().with_tissue(MeshTissue { mode: TissueMode::Volume, resolution: 16 });

@@ -1,4 +1,4 @@
-//! Where the tissue of an organ comes from: shapes and images without a mesh, and meshes with their texture coordinates.
+//! Sources of an organ's tissue: shapes and images without a mesh, and meshes with their texture coordinates.
 
 use super::errors::failure;
 use super::*;
@@ -19,7 +19,7 @@ use bevy_vessels::{
 /// Pixels along a side of the pictures in these tests.
 const SIDE: u32 = 48;
 
-/// An app that knows images.
+/// An app with image assets.
 fn app() -> App {
     let mut app = headless(GrowthBudget::Steps(10));
     app.init_asset::<Image>();
@@ -67,7 +67,7 @@ fn wish(tissue: impl Into<TissueSource>) -> Vasculature {
     quick().with_tissue(tissue)
 }
 
-/// What grows on a tissue without a plugin.
+/// The growth on a tissue without a plugin.
 fn grown(wish: &Vasculature, data: &SourceData) -> [VesselTree; 2] {
     let prepared = wish.tissue.prepare(data).expect("a tissue");
     let generator = wish.generator.clone().fit(prepared.tissue().extent());
@@ -157,7 +157,7 @@ fn an_image_that_comes_late_is_waited_for_and_one_that_changes_is_read_again() {
     assert_eq!(before, trees(app.world(), organ));
 }
 
-/// An image, the settings that it is read with, and what is said of it: the value, and the remedy.
+/// An image, its settings, and the expected error: the value, and the remedy.
 fn bad_images() -> Vec<(&'static str, Image, ImageTissue, &'static str, &'static str)> {
     let size = |width, height, depth_or_array_layers| Extent3d { width, height, depth_or_array_layers };
     let flat = |format, data| image(size(8, 8, 1), TextureDimension::D2, format, data);
@@ -214,7 +214,7 @@ fn bad_images_are_named_and_a_good_one_repairs_the_organ() {
 #[test]
 fn an_image_file_that_is_missing_is_named() {
     let mut app = app();
-    // Any loader will do for a file that isn't there.
+    // Any loader will do for a missing file.
     app.register_asset_loader(bevy::image::ImageLoader::new(bevy::image::CompressedImageFormats::NONE));
     let handle: Handle<Image> = app.world().resource::<AssetServer>().load("no-such-organ.png");
     let organ = app.world_mut().spawn((wish(settings()), OrganImage(handle))).id();

@@ -64,11 +64,11 @@ pub struct CirculationFailed {
     pub error: CirculationError,
 }
 
-/// Why the blood of an organ does not flow.
+/// The reason why an organ's blood does not flow.
 #[derive(Clone, Debug, PartialEq, thiserror::Error, Reflect)]
 #[reflect(opaque, Clone, Debug, PartialEq)]
 pub enum CirculationError {
-    /// Its settings or its vessels leave no way to flow.
+    /// Its settings or its vessels allow no flow.
     #[error(transparent)]
     Flow(#[from] FlowError),
     /// The work on its network panicked.

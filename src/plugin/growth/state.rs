@@ -259,8 +259,8 @@ impl GrowthState {
         self.preparation.as_ref().map(Job::progress)
     }
 
-    /// The result of the preparation, once it is ready. `None` if something else has been asked for meanwhile: a tissue
-    /// is kept, to be painted again, and an error may no longer hold.
+    /// The result of the preparation, once it is ready. `None` if the request has changed meanwhile: a tissue is kept,
+    /// to be painted again, and an error may be outdated.
     pub(crate) fn poll_preparation(&mut self) -> Option<Painted> {
         match Job::poll(&mut self.preparation)?.unwrap_or_else(|panic| Err(panic.into())) {
             Ok(tissue) if *tissue.paint != *self.paint() => {

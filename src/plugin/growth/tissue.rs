@@ -39,7 +39,7 @@ impl PaintedTissue {
         Ok(Self { base, paint, tissue })
     }
 
-    /// The mesh that it is made of, if it is.
+    /// The mesh that it is made from, if any.
     pub(crate) fn mesh(&self) -> Option<&TriangleMesh> {
         self.base.mesh()
     }

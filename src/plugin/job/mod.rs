@@ -99,7 +99,7 @@ impl Jobs<'_> {
 pub(crate) struct Job<T> {
     work: Work<Outcome<T>>,
     pace: Pace,
-    /// Tells the work that nobody waits for it any more.
+    /// Tells the work that its job was dropped.
     is_dropped: Arc<AtomicBool>,
 }
 

@@ -47,8 +47,8 @@ impl Default for JobSettings {
     }
 }
 
-/// Where work is done that is too large to be done at once. The result is the same to the last bit; only the frame in
-/// which it is ready differs.
+/// Where work is done that is too large to be done at once. The result is the same to the last bit; only its frame
+/// differs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect, serde::Serialize, serde::Deserialize)]
 #[reflect(Default, Clone, PartialEq)]
 pub enum JobMode {

@@ -1,4 +1,4 @@
-//! Jobs that are done in slices: a little in each frame, on the thread that runs the schedule.
+//! Jobs in slices: a little work in each frame, on the thread that runs the schedule.
 
 use crate::plugin::job::settings::JobSettings;
 use crate::synthesis::pace::Pace;
@@ -20,13 +20,13 @@ use std::{
 /// Jobs that are done in slices.
 #[derive(Resource, Default)]
 pub(crate) struct JobSlices {
-    /// In the order of their turns. Systems that begin jobs need no exclusive access.
+    /// In the order of their turns. A mutex, so that systems that start jobs need no exclusive access.
     queue: Mutex<VecDeque<Sliced>>,
     clock: Arc<SliceClock>,
 }
 
 struct Sliced {
-    /// Puts its result where the job finds it.
+    /// Stores its result where the job finds it.
     work: Pin<Box<dyn Future<Output = ()> + Send>>,
     is_dropped: Arc<AtomicBool>,
 }
@@ -44,10 +44,10 @@ impl<T> Place<T> {
     }
 }
 
-/// When the slices of a frame end.
+/// The time at which the slices of a frame end.
 struct SliceClock {
     zero: Instant,
-    /// Nanoseconds since then.
+    /// Nanoseconds since `zero`.
     end: AtomicU64,
 }
 
@@ -75,7 +75,7 @@ fn nanoseconds(time: Duration) -> u64 {
     u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Nothing panics while it holds one of these locks; if it did, what they guard would still be whole.
+/// No code panics while it holds one of these locks; even then the guarded data would still be consistent.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -87,7 +87,7 @@ impl JobSlices {
         Pace::new(move || clock.is_over())
     }
 
-    /// Puts work last in the queue. Its result will be in the place.
+    /// Appends work to the queue. Its result will be stored in `place`.
     pub(super) fn add<T: Send + 'static>(
         &self,
         work: impl Future<Output = T> + Send + 'static,
@@ -103,8 +103,8 @@ impl JobSlices {
         place
     }
 
-    /// Does a frame's slices: of one job until the time is over or it is done, then of the next. The next frame begins with
-    /// the next job.
+    /// Does a frame's slices: of one job until it is done or the time is over, then of the next. The next frame begins
+    /// with the next job.
     fn advance(&self, time: Duration) {
         let mut turns = std::mem::take(&mut *lock(&self.queue));
         turns.retain(|job| !job.is_dropped.load(Ordering::Relaxed));
@@ -123,7 +123,7 @@ impl JobSlices {
     }
 }
 
-/// Begin of a frame: jobs that are done in slices go on.
+/// Advances the jobs that are done in slices, at the start of a frame.
 pub(crate) fn advance_slices(settings: Res<JobSettings>, slices: Res<JobSlices>) {
     slices.advance(settings.slice_time);
 }

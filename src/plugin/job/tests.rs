@@ -1,4 +1,4 @@
-//! Jobs in all modes: the same results, progress, an end by letting go, and panics that stop nothing else.
+//! Jobs in all modes: equal results, progress, an end by dropping, and panics that stop nothing else.
 
 use crate::plugin::job::{
     slices::{JobSlices, advance_slices},
@@ -11,13 +11,13 @@ use bevy::ecs::{
 use std::{
     sync::{Mutex, PoisonError, atomic::AtomicUsize},
     thread,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 /// Items of the work in these tests, and of a stretch of it.
 const ITEMS: usize = 100;
 const STRETCH: usize = 10;
-/// Where work is done: at once, in the task pool, and in slices, the shortest that there are.
+/// All modes: at once, in the task pool, and in the shortest slices.
 const AT_ONCE: JobSettings = JobSettings { mode: JobMode::Auto, at_once: usize::MAX, slice_time: Duration::ZERO };
 const TASK_POOL: JobSettings = JobSettings { mode: JobMode::TaskPool, at_once: 0, slice_time: Duration::ZERO };
 const SLICES: JobSettings = JobSettings { mode: JobMode::Slices, ..TASK_POOL };
@@ -77,7 +77,7 @@ async fn sum(count: Arc<AtomicUsize>, pace: Pace) -> usize {
     sum
 }
 
-/// Work that comes to no end by itself.
+/// Work that never ends.
 async fn endless(count: Arc<AtomicUsize>, pace: Pace) {
     loop {
         count.fetch_add(1, Ordering::SeqCst);
@@ -212,7 +212,7 @@ fn a_job_that_nobody_waits_for_never_begins_in_slices() {
     assert_eq!((count.load(Ordering::SeqCst), Arc::strong_count(&count)), (0, 1));
 }
 
-/// A panic hook that keeps quiet would be that of all tests, so these panics are printed.
+/// A silent panic hook would affect all tests, so these panics are printed.
 #[test]
 fn a_panic_is_a_result_too_and_stops_nothing_else() {
     for settings in PLACES {

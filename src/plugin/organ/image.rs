@@ -43,7 +43,7 @@ pub enum OrganImageError {
         /// Pixels along each axis.
         size: UVec3,
     },
-    /// There are fewer pixels than the image's size says.
+    /// There are fewer pixels than the image's size requires.
     #[error(
         "the image has {bytes} bytes, but {} × {} × {} pixels of its format take {expected}; give it all of them",
         size.x, size.y, size.z
@@ -53,7 +53,7 @@ pub enum OrganImageError {
         size: UVec3,
         /// Bytes found.
         bytes: usize,
-        /// Bytes that the pixels take.
+        /// Bytes required.
         expected: usize,
     },
     /// The pixels cannot be read.
@@ -90,7 +90,7 @@ pub(crate) async fn tissue_image(
     Ok(TissueImage { size, values })
 }
 
-/// Passes an image that has a pixel, and as many as it says.
+/// Checks that an image has at least one pixel, and as many as its size requires.
 fn check_size(image: &Image, size: UVec3) -> Result<(), OrganImageError> {
     let pixels = size.to_array().into_iter().fold(1, |pixels: usize, side| pixels.saturating_mul(side as usize));
     if pixels == 0 {

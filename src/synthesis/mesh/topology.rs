@@ -96,7 +96,7 @@ impl MeshTopology {
         at_once(self.is_closed_paced(&Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn is_closed_paced(&self, pace: &Pace) -> bool {
         let (mut stretch, mut done) = (Stretch::default(), 0);
         for fan in self.fans() {

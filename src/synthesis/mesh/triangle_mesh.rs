@@ -109,7 +109,7 @@ impl TriangleMesh {
         at_once(Self::new_paced(positions, triangles, uvs, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -144,7 +144,7 @@ impl TriangleMesh {
             return Err(MeshError::UvCount { uvs: uvs.len(), vertices });
         }
         let mesh = Self { positions, triangles, uvs };
-        // The first triangle is the one, nearly always.
+        // This is nearly always the first triangle.
         if pace.part(0.9..1.0).find(count, |triangle| !mesh.is_degenerate(triangle)).await.is_none() {
             return Err(MeshError::NoArea { triangles: count });
         }
@@ -179,7 +179,7 @@ impl TriangleMesh {
         at_once(self.bounds_paced(&Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn bounds_paced(&self, pace: &Pace) -> Aabb3d {
         let mut min = Vec3::INFINITY;
         let mut max = Vec3::NEG_INFINITY;
@@ -221,7 +221,7 @@ impl TriangleMesh {
         at_once(self.signed_volume_paced(&Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn signed_volume_paced(&self, pace: &Pace) -> f64 {
         // Relative to the centre, so that the terms of a mesh far from the origin do not cancel.
         let origin = self.bounds_paced(&pace.part(0.0..0.4)).await.center();
@@ -243,7 +243,7 @@ impl TriangleMesh {
         at_once(self.with_flipped_paced(flip, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(crate) async fn with_flipped_paced(mut self, flip: impl Fn(usize) -> bool, pace: &Pace) -> Self {
         let (count, triangles) = (self.triangles.len(), &mut self.triangles);
         let turn = |triangle: usize| {

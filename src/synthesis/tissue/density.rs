@@ -50,7 +50,7 @@ impl DensityField {
         at_once(Self::on_indexed_paced(mesh, values, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(super) async fn on_indexed_paced(mesh: &IndexedMesh, values: &[f32], pace: &Pace) -> Result<Self, TissueError> {
         let values = check(values, mesh.mesh().positions().len(), pace).await?;
         Ok(Self(Field::Vertices { mesh: mesh.clone(), values }))

@@ -39,14 +39,14 @@ impl TissuePaint {
         self.density.is_none() && self.no_go.is_empty() && self.guides.is_empty()
     }
 
-    /// Whether some of it is painted on the vertices of a mesh.
+    /// Whether any of it is on the vertices of a mesh.
     pub(super) fn is_on_vertices(&self) -> bool {
         self.density.is_some() || self.no_go.vertices.is_some()
     }
 
-    /// How much work it is to lay it over a tissue that has been prepared, in items: vertices, and pieces of guides.
+    /// Work of laying it over a prepared tissue, in items: vertices, and pieces of guides.
     pub fn work(&self) -> usize {
-        /// A value costs a small part of what an item of other work does.
+        /// A value costs a small part of an item of other work.
         const VALUES_OF_AN_ITEM: usize = 16;
         let vertices = [self.density.as_ref().map(Vec::len), self.no_go.vertices.as_ref().map(Vec::len)];
         let values: usize = vertices.into_iter().flatten().sum();

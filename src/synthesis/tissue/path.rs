@@ -21,7 +21,7 @@ use std::{ops::Range, sync::Arc};
 
 /// Pieces that a guide is cut into when it is laid on another tissue.
 const PIECES: f32 = 256.0;
-/// What it costs to lay one of them, in items of other work.
+/// Cost of laying one of them, in items of other work.
 const WORK_OF_PIECE: usize = 8;
 /// Most points of a guide.
 const MAX_POINTS: usize = 1 << 20;
@@ -64,7 +64,7 @@ impl GuidePath {
         at_once(Self::new_paced(points, deviation, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -72,8 +72,8 @@ impl GuidePath {
         Self::build(points, [check_deviation(deviation)?; 2], pace).await
     }
 
-    /// How much work it is to lay a guide of so many points [over](Self::over) a tissue, in items. Each piece takes two
-    /// searches for the nearest point.
+    /// Work of laying a guide of so many points [over](Self::over) a tissue, in items. Each piece takes two searches
+    /// for the nearest point.
     pub(super) fn work(points: usize) -> usize {
         WORK_OF_PIECE * (points + PIECES as usize)
     }

@@ -74,7 +74,7 @@ impl PreparedTissue {
         &self.plain
     }
 
-    /// The mesh that it is made of, with the texture coordinates that came with it; `None` for other tissues.
+    /// The mesh that it is made from, with its texture coordinates; `None` for other tissues.
     pub fn mesh(&self) -> Option<&TriangleMesh> {
         self.canvas.as_ref().map(|canvas| &*canvas.mesh)
     }

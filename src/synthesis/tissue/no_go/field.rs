@@ -94,7 +94,7 @@ impl NoGoField {
         at_once(Self::on_vertices_paced(mesh, painted, &Pace::default()))
     }
 
-    /// The same, with rests.
+    /// The same as [paced](crate::synthesis::pace) work.
     pub(in crate::synthesis::tissue) async fn on_vertices_paced(
         mesh: &IndexedMesh,
         painted: &[bool],
