@@ -217,6 +217,32 @@ fn a_stroke_during_growth_keeps_what_is_drawn_until_as_many_steps_are_done() {
     assert_eq!(trees(app.world(), organ), painted_from_the_start(quick(), forbidden()));
 }
 
+/// What is drawn stands still while paint is laid beside the frames, and all that was asked for is done then.
+#[test]
+fn a_growth_waits_for_the_paint_that_is_laid_and_can_be_finished_meanwhile() {
+    for drawn in [12, STEPS] {
+        let mut app = headless(GrowthBudget::Steps(3));
+        app.insert_resource(JobSettings { mode: JobMode::Slices, at_once: 0, slice_time: Duration::ZERO });
+        let organ = spawn(&mut app, quick());
+        run_until(&mut app, "some steps", |world| progress(world, organ).step == drawn);
+        let before = trees(app.world(), organ);
+        paint(&mut app, organ, half());
+        app.update();
+        send(&mut app, organ, GrowthAction::Finish);
+        run_until(&mut app, "the end", |world| {
+            if progress(world, organ).phase == GrowthPhase::Finished {
+                return true;
+            }
+            let state = world.get::<GrowthState>(organ).expect("an organ has a state");
+            assert_eq!(progress(world, organ).phase, GrowthPhase::Regrowing, "{drawn} steps");
+            assert!(state.successor().is_none(), "once the paint is there, all is done in one frame");
+            assert_eq!(trees(world, organ), before, "{drawn} steps");
+            false
+        });
+        assert_eq!(trees(app.world(), organ), painted_from_the_start(quick(), half()), "{drawn} steps");
+    }
+}
+
 #[test]
 fn a_stroke_before_the_first_step_starts_at_once() {
     let mut app = headless(GrowthBudget::Steps(1));

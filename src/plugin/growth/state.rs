@@ -217,6 +217,12 @@ impl GrowthState {
         self.beside
     }
 
+    /// Whether paint is being laid for vessels that will take the place of those that are drawn. Until it is there, the
+    /// drawn ones stand still: their steps would be of no use.
+    pub(crate) fn awaits_successor(&self) -> bool {
+        self.beside && self.successor.is_none()
+    }
+
     /// Drops the successors if the drawn vessels grew on the present paint, because a stroke was taken back.
     pub(crate) fn takes_back(&mut self) -> bool {
         let is_drawn = self.tissue.as_ref().is_some_and(|tissue| *tissue.paint == *self.paint());

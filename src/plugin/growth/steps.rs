@@ -27,12 +27,14 @@ impl GrowthState {
 
     /// Whether there are steps left to do.
     pub(crate) fn is_growing(&self) -> bool {
-        self.error().is_none() && self.active().is_some_and(|growth| !growth.is_finished())
+        let is_under_way = self.active().is_some_and(|growth| !growth.is_finished());
+        is_under_way && self.error().is_none() && !self.awaits_successor()
     }
 
     /// Whether all steps are done and their result is drawn.
     pub(crate) fn is_done(&self) -> bool {
-        self.error().is_none() && self.active().is_some_and(|growth| growth.is_finished()) && self.successor.is_none()
+        let is_grown = self.successor.is_none() && self.growth().is_some_and(|growth| growth.is_finished());
+        is_grown && self.error().is_none() && !self.awaits_successor()
     }
 
     /// Whether a step may be done now.

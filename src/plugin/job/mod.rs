@@ -17,8 +17,6 @@ use bevy::{
     },
     tasks::{AsyncComputeTaskPool, Task, TaskPool, futures::check_ready, futures_lite::FutureExt},
 };
-pub use settings::{JobMode, JobSettings};
-
 use slices::{JobSlices, Place};
 use std::{
     any::Any,
@@ -34,6 +32,8 @@ mod settings;
 mod slices;
 #[cfg(test)]
 mod tests;
+
+pub use settings::{JobMode, JobSettings};
 
 /// The work that an organ was waiting for panicked. That organ fails; the app and all other organs go on.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
