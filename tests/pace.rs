@@ -404,7 +404,7 @@ fn there_is_a_rest_for_every_stretch_of_items() {
 /// Each time is the least of several runs, to exclude other processes.
 #[test]
 fn no_stretch_is_a_large_part_of_the_work() {
-    /// What a stretch may take however little there is to do: more than any does on a slow machine.
+    /// Time that any stretch may take, more than on a slow machine.
     const ROOM: Duration = Duration::from_millis(4);
     for case in cases(128) {
         let walks = [0; 3].map(|_| (case.paced)(&Pace::new(|| true)));

@@ -217,7 +217,7 @@ fn a_stroke_during_growth_keeps_what_is_drawn_until_as_many_steps_are_done() {
     assert_eq!(trees(app.world(), organ), painted_from_the_start(quick(), forbidden()));
 }
 
-/// What is drawn stands still while paint is laid beside the frames, and all that was asked for is done then.
+/// Drawn vessels pause while a job lays paint, and requested steps are done afterwards.
 #[test]
 fn a_growth_waits_for_the_paint_that_is_laid_and_can_be_finished_meanwhile() {
     for drawn in [12, STEPS] {

@@ -217,8 +217,8 @@ impl GrowthState {
         self.beside
     }
 
-    /// Whether paint is being laid for vessels that will take the place of those that are drawn. Until it is there, the
-    /// drawn ones stand still: their steps would be of no use.
+    /// Whether paint is being laid for vessels that will replace the drawn ones. Until it is ready, the drawn ones
+    /// pause, since their steps would be useless.
     pub(crate) fn awaits_successor(&self) -> bool {
         self.beside && self.successor.is_none()
     }

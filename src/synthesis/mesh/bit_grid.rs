@@ -41,7 +41,7 @@ impl BitGrid {
 
     /// A list of the set voxels, in order.
     pub async fn list(&self, pace: &Pace) -> Vec<u32> {
-        // Room for all, since a list that outgrows its room is copied without a rest.
+        // Full capacity, since growing a list copies it without a rest.
         let count = self.words.last().zip(self.ranks.last()).map_or(0, |(word, before)| before + word.count_ones());
         let mut list = Vec::with_capacity(count as usize);
         let mut left = self.iter().map(|voxel| voxel as u32).peekable();

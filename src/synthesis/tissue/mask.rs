@@ -173,7 +173,7 @@ impl Mask {
     async fn list_runs(&self, pace: &Pace) -> (Vec<Bounds>, Bounds) {
         let mut bounds = Bounds::EMPTY;
         let goes_on = |a: u32, b: u32| b == a + 1 && !(b as usize).is_multiple_of(self.size[0]);
-        // Room for all, since a list that outgrows its room is copied without a rest.
+        // Full capacity, since growing a list copies it without a rest.
         let mut count = 1;
         let compare = |pair: usize| count += usize::from(!goes_on(self.set[pair], self.set[pair + 1]));
         pace.part(0.0..0.3).each(self.set.len() - 1, compare).await;
