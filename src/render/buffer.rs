@@ -153,7 +153,7 @@ pub(super) fn attach_buffers(
         let buffer = buffers.add(buffer);
         let extension = SegmentExtension { segments: buffer.clone() };
         let material = materials.add(SegmentMaterial { base: templates.0[vessels.kind()].clone(), extension });
-        commands.entity(entity).insert(SegmentBuffer {
+        commands.entity(entity).try_insert(SegmentBuffer {
             buffer,
             material,
             drawn: ChangeCursor::default(),

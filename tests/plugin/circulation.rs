@@ -255,6 +255,25 @@ fn settings_that_cannot_be_are_named_and_can_be_mended() {
 }
 
 #[test]
+fn ends_are_dry_while_the_blood_cannot_flow() {
+    let mut app = timed_app(FRAME);
+    let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
+    cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
+    for _ in 0..2 {
+        run_until(&mut app, "blood", |world| loss(world, organ).bleeding_ends == 2);
+        assert!(open_ends(&mut app).iter().all(|end| end.state == EndState::Bleeding && end.flow.ml_per_min() > 0.0));
+        let good = app.world().get::<Perfusion>(organ).unwrap().clone();
+        app.world_mut().get_mut::<Perfusion>(organ).unwrap().discharge_coefficient = 1.5;
+        run_until(&mut app, "a failure", |world| {
+            world.get::<CirculationState>(organ).is_some_and(|state| state.error().is_some())
+        });
+        app.update();
+        assert!(open_ends(&mut app).iter().all(|end| end.state == EndState::Dry && end.flow.ml_per_min() == 0.0));
+        *app.world_mut().get_mut::<Perfusion>(organ).unwrap() = good;
+    }
+}
+
+#[test]
 fn an_organ_without_perfusion_does_not_bleed_any_more() {
     let mut app = timed_app(FRAME);
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());

@@ -64,6 +64,23 @@ fn vessels_follow_in_the_same_frame_and_nothing_grows_again() {
     assert_eq!(progress(app.world(), organ).phase, GrowthPhase::Finished, "a deformed mesh is no other mesh");
 }
 
+/// A mesh that cannot be an organ has no rest shape.
+#[test]
+fn new_vertices_mend_a_mesh_that_could_not_be_an_organ() {
+    let mut app = timed_app(FRAME);
+    let mut bad = sphere();
+    let nowhere = vec![[f32::NAN; 3]; bad.count_vertices()];
+    bad.insert_attribute(Mesh::ATTRIBUTE_POSITION, nowhere);
+    let mesh = add_mesh(&mut app, bad);
+    let organ = app.world_mut().spawn((Mesh3d(mesh), quick(), FollowsMesh)).id();
+    run_to_phase(&mut app, organ, GrowthPhase::Failed);
+    (0..3).for_each(|_| app.update());
+    assert_eq!(progress(app.world(), organ).phase, GrowthPhase::Failed);
+    edit_mesh(&mut app, organ, |mesh| *mesh = sphere());
+    run_to_phase(&mut app, organ, GrowthPhase::Finished);
+    assert_published(app.world(), organ);
+}
+
 #[test]
 fn what_is_cut_is_where_the_organ_has_it() {
     let mut app = timed_app(FRAME);

@@ -1,7 +1,7 @@
 //! Vessel entities belong to their organ: they are spawned, moved, hidden and despawned with it.
 
 use super::*;
-use bevy_vessels::plugin::{VesselAppearance, VesselsOf};
+use bevy_vessels::plugin::{Cuttable, Perfusion, VesselAppearance, VesselSystems, VesselsOf};
 
 fn vessel_count(app: &mut App) -> usize {
     app.world_mut().query::<&Vessels>().iter(app.world()).count()
@@ -87,6 +87,40 @@ fn despawning_an_organ_while_its_vessels_are_spawned_leaves_none() {
     run_until(&mut app, "the end of the organ", |world| world.get_entity(organ).is_err());
     (0..3).for_each(|_| app.update());
     assert_eq!(vessel_count(&mut app), 0);
+}
+
+/// The commands of the plugin don't fail, and spawn nothing, wherever in a frame another command was before them.
+#[test]
+fn an_organ_or_its_vasculature_may_be_removed_in_any_set() {
+    use VesselSystems::{Circulate, Cut, Follow, Grow, Publish, Source};
+
+    fn despawn(organs: Query<(Entity, &GrowthProgress)>, mut commands: Commands) {
+        for (organ, _) in organs.iter().filter(|(_, progress)| progress.phase != GrowthPhase::WaitingForMesh) {
+            commands.entity(organ).try_despawn();
+        }
+    }
+
+    fn remove(organs: Query<(Entity, &GrowthProgress)>, mut commands: Commands) {
+        for (organ, _) in organs.iter().filter(|(_, progress)| progress.phase != GrowthPhase::WaitingForMesh) {
+            commands.entity(organ).try_remove::<Vasculature>();
+        }
+    }
+
+    for set in [Source, Grow, Publish, Follow, Cut, Circulate] {
+        for is_despawned in [true, false] {
+            let mut app = headless(GrowthBudget::default());
+            if is_despawned {
+                app.add_systems(Update, despawn.in_set(set));
+            } else {
+                app.add_systems(Update, remove.in_set(set));
+            }
+            let organ = spawn(&mut app, quick());
+            app.world_mut().entity_mut(organ).insert((Cuttable::default(), Perfusion::default()));
+            run_until(&mut app, "the end", |world| world.get::<Vasculature>(organ).is_none());
+            (0..3).for_each(|_| app.update());
+            assert_eq!(vessel_count(&mut app), 0, "{set:?}");
+        }
+    }
 }
 
 #[test]

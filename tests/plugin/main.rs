@@ -12,6 +12,7 @@ mod deformation;
 mod desktop;
 mod entities;
 mod errors;
+mod generators;
 mod growth;
 mod observers;
 mod operating_field;

@@ -243,6 +243,30 @@ fn a_growth_waits_for_the_paint_that_is_laid_and_can_be_finished_meanwhile() {
     }
 }
 
+/// With other settings, too, all waits for the paint: nothing more grows with the old ones.
+#[test]
+fn a_growth_with_other_settings_waits_for_its_paint_and_can_be_finished_meanwhile() {
+    let mut app = headless(GrowthBudget::Steps(3));
+    app.insert_resource(JobSettings { mode: JobMode::Slices, at_once: 0, slice_time: Duration::ZERO });
+    let organ = spawn(&mut app, quick());
+    run_until(&mut app, "some steps", |world| progress(world, organ).step == 12);
+    let (before, other) = (trees(app.world(), organ), quick().with_seed(8));
+    app.world_mut().entity_mut(organ).insert(other.clone());
+    paint(&mut app, organ, half());
+    app.update();
+    send(&mut app, organ, GrowthAction::Finish);
+    run_until(&mut app, "the end", |world| {
+        let phase = progress(world, organ).phase;
+        if phase == GrowthPhase::PreparingTissue {
+            assert_eq!(trees(world, organ), before, "nothing grows with the old seed");
+        } else {
+            assert_eq!(phase, GrowthPhase::Finished, "once the paint is there, all is done in one frame");
+        }
+        phase == GrowthPhase::Finished
+    });
+    assert_eq!(trees(app.world(), organ), painted_from_the_start(other, half()));
+}
+
 #[test]
 fn a_stroke_before_the_first_step_starts_at_once() {
     let mut app = headless(GrowthBudget::Steps(1));

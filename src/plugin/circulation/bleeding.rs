@@ -70,7 +70,10 @@ impl PerfusedOrganItem<'_, '_> {
         let entities = self.vessels.map_or(&[][..], OrganVessels::entities);
         let state = self.state.bypass_change_detection();
         let before = lay_gaps(state, entities, vessels)?;
-        let Some(flow) = state.flow.as_mut() else { return Ok(false) };
+        let Some(flow) = state.flow.as_mut() else {
+            run_dry(state, entities, vessels, open_ends);
+            return Ok(false);
+        };
         if before.is_none() && (!state.ends.values().any(|ends| !ends.is_empty()) || seconds == 0.0) {
             return Ok(false);
         }
@@ -145,6 +148,23 @@ fn tell(
             }
         } else if let Some((end, entity)) = find(now).and_then(|end| Some((end, entity(&end)?))) {
             messages.started.announce(BleedingStarted { organ, vessels, end: end.id, side: end.side, entity });
+        }
+    }
+}
+
+/// Lets the open ends run dry whose flow has failed.
+fn run_dry(
+    state: &mut CirculationState,
+    entities: &[Entity],
+    vessels: &Query<Perfused>,
+    open_ends: &mut Query<&mut OpenEnd>,
+) {
+    for found in each_kind(entities, vessels) {
+        for end in std::mem::take(&mut state.ends[found.vessels.kind()]) {
+            let Some(entity) = found.entities.and_then(|entities| entities.get(end.id)) else { continue };
+            if let Ok(mut open_end) = open_ends.get_mut(entity) {
+                open_end.dry();
+            }
         }
     }
 }

@@ -49,7 +49,7 @@ pub(crate) fn prepare_organs(
 ) {
     for (organ, vessels) in &organs {
         if patient_of(organ, &parents, |entity| patients.contains(entity)).is_none() {
-            commands.entity(organ).insert(Patient::default());
+            commands.entity(organ).try_insert(Patient::default());
         }
         let entities = vessels.map_or(&[][..], OrganVessels::entities);
         for &vessels in entities.iter().filter(|&&vessels| !supplies.contains(vessels)) {

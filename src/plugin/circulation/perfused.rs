@@ -45,13 +45,12 @@ impl PerfusedOrganItem<'_, '_> {
         self.vessels.map_or(&[], OrganVessels::entities)
     }
 
-    /// Stops the blood until something changes.
+    /// Stops the blood until something changes. The open ends run dry when they would bleed next.
     pub(crate) fn fail(&mut self, error: CirculationError, failed: &mut Announcer<CirculationFailed>) {
         let organ = self.entity;
         warn!("{organ}: its blood does not flow: {error}");
         self.state.job = None;
         self.state.flow = None;
-        self.state.ends.values_mut().for_each(Vec::clear);
         self.state.error = Some(error.clone());
         *self.loss = BloodLoss { total: self.loss.total, ..BloodLoss::default() };
         failed.announce(CirculationFailed { organ, error });

@@ -101,7 +101,7 @@ fn catch_up(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
     let before = progress.step;
     state.catch_up();
     *progress = GrowthProgress::of(GrowthPhase::Growing, state.growth(), progress.grow_time + start.elapsed());
-    progress.step - before
+    progress.step.saturating_sub(before)
 }
 
 /// Does all remaining steps of an organ that has its tissue, and returns their number.
@@ -116,5 +116,5 @@ pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress)
     state.run();
     let grow_time = progress.grow_time + start.elapsed();
     *progress = GrowthProgress::of(GrowthPhase::Growing, state.growth(), grow_time);
-    progress.step - before
+    progress.step.saturating_sub(before)
 }

@@ -121,9 +121,13 @@ fn spawn_vessels(
     let visibility = look.visibility(kind);
     let name = Name::new(kind.plural());
     let aabb = vessels.aabb();
-    // By the time this is applied, the organ may be gone, or `grow_now` may have given it these vessels.
+    // By the time this is applied, the organ may be gone or have lost its vasculature, or `grow_now` may have given it
+    // these vessels.
     commands.entity(organ).queue_silenced(move |mut organ: EntityWorldMut| {
         let id = organ.id();
+        if !organ.contains::<Vasculature>() {
+            return;
+        }
         organ.world_scope(|world| {
             let mut siblings = world.query::<(&Vessels, &VesselsOf)>();
             if !siblings.iter(world).any(|(other, of)| other.kind() == kind && of.0 == id) {

@@ -77,7 +77,7 @@ pub(crate) fn obey_commands(
 
 /// Compares the vasculature, paint and assets with what each growth follows.
 ///
-/// New vertex positions are no change if the vessels follow the mesh.
+/// New vertex positions are no change if the vessels follow the mesh, unless it could not be an organ before.
 pub(crate) fn notice_changes(
     mut mesh_events: MessageReader<AssetEvent<Mesh>>,
     mut image_events: MessageReader<AssetEvent<Image>>,
@@ -92,7 +92,8 @@ pub(crate) fn notice_changes(
             organ.state.notice_image(image, replaced);
         }
         for &(mesh, replaced) in &mesh_news {
-            let is_deformed = || organ.rest.is_some_and(|rest| rest.is_of(meshes.get(mesh)));
+            let is_deformed =
+                || organ.state.has_good_mesh() && organ.rest.is_some_and(|rest| rest.is_of(meshes.get(mesh)));
             if organ.mesh.is_some_and(|organ_mesh| organ_mesh.id() == mesh) && !is_deformed() {
                 organ.state.notice_mesh(mesh, replaced);
             }

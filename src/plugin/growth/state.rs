@@ -164,6 +164,11 @@ impl GrowthState {
         }
     }
 
+    /// Whether the mesh that was read last could be an organ. If not, new vertex positions may mend it.
+    pub(crate) fn has_good_mesh(&self) -> bool {
+        !matches!(self.error, Some(OrganGrowthError::Mesh(_)))
+    }
+
     fn demand(&mut self, need: Need) {
         self.need = self.need.max(need);
     }
@@ -217,10 +222,10 @@ impl GrowthState {
         self.beside
     }
 
-    /// Whether paint is being laid for vessels that will replace the drawn ones. Until it is ready, the drawn ones
-    /// pause, since their steps would be useless.
-    pub(crate) fn awaits_successor(&self) -> bool {
-        self.beside && self.successor.is_none()
+    /// Whether other vessels will replace the present ones but have not started: a tissue or paint is being prepared,
+    /// or the start waits for its turn. Until then the present ones pause, since their steps would be useless.
+    pub(crate) fn awaits_others(&self) -> bool {
+        self.need != Need::Nothing || self.preparation.is_some() || (self.beside && self.successor.is_none())
     }
 
     /// Drops the successors if the drawn vessels grew on the present paint, because a stroke was taken back.
@@ -260,9 +265,10 @@ impl GrowthState {
     }
 
     /// The result of the preparation, once it is ready. `None` if the request has changed meanwhile: a tissue is kept,
-    /// to be painted again, and an error may be outdated.
+    /// to be painted again, unless it is made from something else now; an error may be outdated.
     pub(crate) fn poll_preparation(&mut self) -> Option<Painted> {
         match Job::poll(&mut self.preparation)?.unwrap_or_else(|panic| Err(panic.into())) {
+            _ if self.need == Need::Tissue => None,
             Ok(tissue) if *tissue.paint != *self.paint() => {
                 self.tissue.get_or_insert(tissue);
                 None
@@ -295,6 +301,8 @@ impl GrowthState {
             let growth = generator.start(tissue, &roots, seed)?;
             let warnings = growth.warnings();
             self.successor = Some(Successor::of(&**drawn, painted, growth));
+            // A generator may do everything at its start. No step follows then.
+            self.succeed();
             warnings
         } else {
             self.begin_trees();
@@ -354,10 +362,14 @@ impl GrowthState {
 #[cfg(test)]
 mod tests {
     use crate::plugin::{
-        growth::state::*,
+        growth::{state::*, tissue::SourceCopy},
         job::{self, Jobs},
     };
-    use crate::synthesis::{pace::Pace, tissue::TissueError};
+    use crate::synthesis::{
+        pace::Pace,
+        preset::PresetName,
+        tissue::{TissueError, TissueShape},
+    };
     use bevy::{
         app::{App, Update},
         ecs::{schedule::ScheduleLabel, system::SystemState},
@@ -365,12 +377,21 @@ mod tests {
 
     /// A growth that waits for a preparation, which is done.
     fn prepared<W: Future<Output = Painted> + Send + 'static>(preparation: impl FnOnce(Pace) -> W) -> GrowthState {
-        let (mut app, mut state) = (App::new(), GrowthState::default());
+        let mut state = GrowthState::default();
+        await_done(&mut state, preparation);
+        state
+    }
+
+    /// Lets a growth wait for a preparation, which is done.
+    fn await_done<W: Future<Output = Painted> + Send + 'static>(
+        state: &mut GrowthState,
+        preparation: impl FnOnce(Pace) -> W,
+    ) {
+        let mut app = App::new();
         job::register(&mut app, Update.intern());
         let mut jobs = SystemState::<Jobs>::new(app.world_mut());
         state.await_tissue(jobs.get(app.world()).expect("jobs are registered").start(0, preparation));
         assert!(state.is_tissue_ready());
-        state
     }
 
     #[test]
@@ -388,6 +409,19 @@ mod tests {
     fn what_was_wrong_does_not_count_once_something_else_is_asked_for() {
         let mut state = prepared(async |_| Err(TissueError::NoMesh.into()));
         state.obey(GrowthAction::Restart, GrowthControl::Running);
+        assert!(state.poll_preparation().is_none());
+        assert_eq!(state.next_need(), Need::Tissue);
+    }
+
+    #[test]
+    fn a_tissue_is_outdated_once_the_organ_is_made_from_something_else() {
+        let mut state = GrowthState::default();
+        let mut wish = Preset { tissue: TissueShape::ball(1.0).into(), ..PresetName::Paper.load() };
+        state.follow(wish.clone(), 0, &TissuePaint::default(), SourceAssets::default());
+        let ball = wish.tissue.clone();
+        await_done(&mut state, |pace| SourceCopy::Nothing.prepare(ball, Arc::default(), pace));
+        wish.tissue = TissueShape::ball(2.0).into();
+        state.follow(wish, 0, &TissuePaint::default(), SourceAssets::default());
         assert!(state.poll_preparation().is_none());
         assert_eq!(state.next_need(), Need::Tissue);
     }

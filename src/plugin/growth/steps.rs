@@ -28,13 +28,13 @@ impl GrowthState {
     /// Whether there are steps left to do.
     pub(crate) fn is_growing(&self) -> bool {
         let is_under_way = self.active().is_some_and(|growth| !growth.is_finished());
-        is_under_way && self.error().is_none() && !self.awaits_successor()
+        is_under_way && self.error().is_none() && !self.awaits_others()
     }
 
     /// Whether all steps are done and their result is drawn.
     pub(crate) fn is_done(&self) -> bool {
         let is_grown = self.successor.is_none() && self.growth().is_some_and(|growth| growth.is_finished());
-        is_grown && self.error().is_none() && !self.awaits_successor()
+        is_grown && self.error().is_none() && !self.awaits_others()
     }
 
     /// Whether a step may be done now.
@@ -70,7 +70,7 @@ impl GrowthState {
     }
 
     /// Replaces the drawn growth by a successor that has caught up with it.
-    fn succeed(&mut self) {
+    pub(super) fn succeed(&mut self) {
         let Some(Successor { tissue, mut growth, .. }) = self.successor.take_if(|successor| successor.has_caught_up())
         else {
             return;

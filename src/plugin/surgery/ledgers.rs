@@ -35,7 +35,7 @@ pub(crate) fn attach_wounds(
         let Ok(index) = bare.get(entity) else { continue };
         index.prepare();
         // Vessels from a scene have a ledger already.
-        commands.entity(entity).insert_if_new((VesselWounds::default(), OpenEndEntities::default()));
+        commands.entity(entity).try_insert_if_new((VesselWounds::default(), OpenEndEntities::default()));
     }
 }
 

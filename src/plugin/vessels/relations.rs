@@ -58,7 +58,7 @@ pub(crate) fn mend_relations(
         if let Some(parent) = parent.map(ChildOf::parent)
             && parents.get(parent).is_ok_and(|children| !children.contains(&entity))
         {
-            commands.entity(entity).insert(ChildOf(parent));
+            commands.entity(entity).try_insert(ChildOf(parent));
         }
     }
 }
