@@ -24,8 +24,9 @@ fn sources(folders: &[&str]) -> Vec<Source> {
     let paths = folders.iter().flat_map(|folder| rust_files(&project().join(folder)));
     paths
         .map(|path| {
-            let name = path.strip_prefix(project()).unwrap().to_string_lossy().replace('\\', "/");
-            Source::new(&name, &fs::read_to_string(&path).unwrap())
+            let name =
+                path.strip_prefix(project()).expect("a path in the project").to_string_lossy().replace('\\', "/");
+            Source::new(&name, &fs::read_to_string(&path).expect("a file that can be read"))
         })
         .collect()
 }

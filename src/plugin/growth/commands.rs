@@ -62,7 +62,7 @@ fn finish_organ(In(entity): In<Entity>, assets: OrganAssets, mut organs: Query<O
         return;
     };
     organ.follow();
-    organ.state.hasten();
+    organ.state.request_finish();
     if organ.state.need != Need::Nothing {
         let outcome = organ.begin(&assets, None);
         organ.report(outcome, &mut messages);

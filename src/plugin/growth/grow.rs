@@ -30,7 +30,7 @@ pub(crate) fn grow(
 ) {
     let start = Instant::now();
     let mut steps = 0;
-    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.is_in_arrears()) {
+    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.must_repeat_steps()) {
         steps += catch_up(&mut state, &mut progress);
     }
     for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.finish) {

@@ -86,7 +86,7 @@ impl Plugin for GrowthPlugin {
             .add_observer(publish::remove_vessels);
         diagnostics::register(app);
         let source = (
-            source::obey_commands,
+            source::apply_commands,
             source::notice_changes,
             source::begin,
             source::receive_tissues,

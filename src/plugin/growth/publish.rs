@@ -45,7 +45,7 @@ pub(crate) fn publish_vessels(
     mut published: Query<PublishedVessels>,
     mut frame: ResMut<GrowthFrame>,
 ) {
-    for (organ, mut state, appearance, entities) in organs.iter_mut().filter(|(_, state, ..)| state.has_news()) {
+    for (organ, mut state, appearance, entities) in organs.iter_mut().filter(|(_, state, ..)| state.has_changes()) {
         let start = Instant::now();
         let entities = entities.map_or(&[][..], OrganVessels::entities);
         for kind in VesselKind::ALL {
@@ -65,7 +65,7 @@ pub(crate) fn publish_vessels(
             }
         }
         let cost = start.elapsed();
-        state.clear_news(cost);
+        state.clear_changes(cost);
         frame.publish_time += cost;
     }
 }

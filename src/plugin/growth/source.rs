@@ -63,13 +63,13 @@ pub(crate) struct StartMessages<'w, 's> {
 }
 
 /// Carries out the commands of this frame.
-pub(crate) fn obey_commands(
+pub(crate) fn apply_commands(
     mut commands: MessageReader<GrowthCommand>,
     mut organs: Query<(&mut GrowthControl, &mut GrowthState)>,
 ) {
     for command in commands.read() {
         if let Ok((mut control, mut state)) = organs.get_mut(command.organ) {
-            let obeyed = state.obey(command.action, *control);
+            let obeyed = state.apply(command.action, *control);
             control.set_if_neq(obeyed);
         }
     }
@@ -222,7 +222,7 @@ impl OrganItem<'_, '_> {
     /// drawn ones.
     fn grow_on_tissue_at_hand(&mut self, need: Need, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         self.state.choose_place(need);
-        if self.state.takes_back() {
+        if self.state.cancel_if_undone() {
             return self.wait(self.state.phase());
         }
         let (paint, tissue) = (self.state.paint(), self.state.tissue_at_hand().cloned());

@@ -48,7 +48,7 @@ pub struct GrowthState {
     /// Warnings already given about the settings.
     warned: Vec<GrowthWarning>,
     /// Steps that the growth had done when its organ was saved, and repeats at once.
-    pub(super) arrears: u32,
+    pub(super) steps_to_repeat: u32,
     /// Steps that a paused growth may still do.
     pub(super) granted: u32,
     /// Whether to do all remaining steps at once.
@@ -90,7 +90,7 @@ impl GrowthState {
     }
 
     /// Carries out a command, and returns whether the growth runs from now on.
-    pub(crate) fn obey(&mut self, action: GrowthAction, control: GrowthControl) -> GrowthControl {
+    pub(crate) fn apply(&mut self, action: GrowthAction, control: GrowthControl) -> GrowthControl {
         match action {
             GrowthAction::Pause => {
                 self.granted = 0;
@@ -102,7 +102,7 @@ impl GrowthState {
                 return GrowthControl::Paused;
             }
             GrowthAction::Restart => {
-                self.arrears = 0;
+                self.steps_to_repeat = 0;
                 self.granted = 0;
                 self.finish = false;
                 self.demand(Need::Growth);
@@ -123,7 +123,7 @@ impl GrowthState {
         followed.assets = assets;
         if followed.settings != settings || followed.seed != seed {
             (followed.settings, followed.seed) = (settings, seed);
-            self.arrears = 0;
+            self.steps_to_repeat = 0;
         }
         if *followed.paint != *paint {
             followed.paint = Arc::new(paint.clone());
@@ -134,7 +134,7 @@ impl GrowthState {
     /// Notes how many steps an organ from a scene, or a clone, had done.
     pub(crate) fn resume(&mut self, steps: u32) {
         if self.followed.is_none() {
-            self.arrears = steps;
+            self.steps_to_repeat = steps;
         }
     }
 
@@ -175,7 +175,7 @@ impl GrowthState {
 
     /// Demands that all steps are done as soon as possible. Drops a preparation under way, since its result is needed
     /// now.
-    pub(crate) fn hasten(&mut self) {
+    pub(crate) fn request_finish(&mut self) {
         self.finish = true;
         if self.preparation.take().is_some() {
             self.demand(if self.tissue.is_none() {
@@ -229,15 +229,15 @@ impl GrowthState {
     }
 
     /// Drops the successors if the drawn vessels grew on the present paint, because a stroke was taken back.
-    pub(crate) fn takes_back(&mut self) -> bool {
+    pub(crate) fn cancel_if_undone(&mut self) -> bool {
         let is_drawn = self.tissue.as_ref().is_some_and(|tissue| *tissue.paint == *self.paint());
-        let takes_back = self.beside && is_drawn;
-        if takes_back {
+        let is_undone = self.beside && is_drawn;
+        if is_undone {
             (self.successor, self.preparation, self.error) = (None, None, None);
             self.need = Need::Nothing;
             self.beside = false;
         }
-        takes_back
+        is_undone
     }
 
     /// The current tissue, with the present paint if that has been laid already.
@@ -315,7 +315,7 @@ impl GrowthState {
             self.growth.insert(growth).warnings()
         };
         self.beside = false;
-        Ok(self.unheard(warnings))
+        Ok(self.new_warnings(warnings))
     }
 
     /// Gives the trees new lineages.
@@ -324,10 +324,10 @@ impl GrowthState {
         self.rebuild = ByKind::from_fn(|_| true);
     }
 
-    fn unheard(&mut self, warnings: Vec<GrowthWarning>) -> Vec<GrowthWarning> {
-        let unheard = warnings.iter().filter(|warning| !self.warned.contains(warning)).cloned().collect();
+    fn new_warnings(&mut self, warnings: Vec<GrowthWarning>) -> Vec<GrowthWarning> {
+        let new = warnings.iter().filter(|warning| !self.warned.contains(warning)).cloned().collect();
         self.warned = warnings;
-        unheard
+        new
     }
 
     /// Ends the work under way because of an error. Vessels of an earlier growth are dropped, too, since they are
@@ -401,14 +401,14 @@ mod tests {
         assert!(matches!(&error, OrganGrowthError::Panicked(_)) && error.to_string().contains("a vertex of 1 edges"));
         state.fail(error);
         assert!(state.error().is_some() && !state.is_tissue_ready());
-        state.obey(GrowthAction::Restart, GrowthControl::Running);
+        state.apply(GrowthAction::Restart, GrowthControl::Running);
         assert_eq!(state.next_need(), Need::Tissue);
     }
 
     #[test]
     fn what_was_wrong_does_not_count_once_something_else_is_asked_for() {
         let mut state = prepared(async |_| Err(TissueError::NoMesh.into()));
-        state.obey(GrowthAction::Restart, GrowthControl::Running);
+        state.apply(GrowthAction::Restart, GrowthControl::Running);
         assert!(state.poll_preparation().is_none());
         assert_eq!(state.next_need(), Need::Tissue);
     }
@@ -429,19 +429,19 @@ mod tests {
     #[test]
     fn a_restart_without_tissue_prepares_it() {
         let mut state = GrowthState::default();
-        state.obey(GrowthAction::Restart, GrowthControl::Running);
+        state.apply(GrowthAction::Restart, GrowthControl::Running);
         assert_eq!(state.next_need(), Need::Tissue);
     }
 
     #[test]
     fn commands_grant_steps_to_a_paused_growth() {
         let mut state = GrowthState::default();
-        assert_eq!(state.obey(GrowthAction::Step(2), GrowthControl::Running), GrowthControl::Paused);
+        assert_eq!(state.apply(GrowthAction::Step(2), GrowthControl::Running), GrowthControl::Paused);
         assert_eq!(state.granted, 2);
-        assert_eq!(state.obey(GrowthAction::Pause, GrowthControl::Paused), GrowthControl::Paused);
+        assert_eq!(state.apply(GrowthAction::Pause, GrowthControl::Paused), GrowthControl::Paused);
         assert_eq!(state.granted, 0);
-        assert_eq!(state.obey(GrowthAction::Resume, GrowthControl::Paused), GrowthControl::Running);
-        assert_eq!(state.obey(GrowthAction::Finish, GrowthControl::Paused), GrowthControl::Paused);
+        assert_eq!(state.apply(GrowthAction::Resume, GrowthControl::Paused), GrowthControl::Running);
+        assert_eq!(state.apply(GrowthAction::Finish, GrowthControl::Paused), GrowthControl::Paused);
         assert!(state.finish);
     }
 }

@@ -12,8 +12,8 @@ use std::time::Duration;
 
 impl GrowthState {
     /// Whether there are steps to repeat at once.
-    pub(crate) fn is_in_arrears(&self) -> bool {
-        self.arrears > 0 && self.growth.is_some()
+    pub(crate) fn must_repeat_steps(&self) -> bool {
+        self.steps_to_repeat > 0 && self.growth.is_some()
     }
 
     /// The growth that does the steps: the drawn one, or its successor.
@@ -112,7 +112,7 @@ impl GrowthState {
 
     /// Repeats the steps that were done before the organ was saved.
     pub(crate) fn catch_up(&mut self) {
-        for _ in 0..std::mem::take(&mut self.arrears) {
+        for _ in 0..std::mem::take(&mut self.steps_to_repeat) {
             let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { break };
             growth.advance();
         }
@@ -132,7 +132,7 @@ impl GrowthState {
     }
 
     /// Whether there is something to publish.
-    pub(crate) fn has_news(&self) -> bool {
+    pub(crate) fn has_changes(&self) -> bool {
         self.rebuild.values().any(|&rebuild| rebuild) || self.changed.values().any(|changed| !changed.is_empty())
     }
 
@@ -148,7 +148,7 @@ impl GrowthState {
     }
 
     /// Clears the published changes, and records the cost of publishing.
-    pub(crate) fn clear_news(&mut self, cost: Duration) {
+    pub(crate) fn clear_changes(&mut self, cost: Duration) {
         self.costs.note_publishing(cost);
         self.rebuild = ByKind::default();
         self.changed.values_mut().for_each(Vec::clear);

@@ -100,7 +100,7 @@ pub(crate) fn follow_presets(
             _ => None,
         };
         if let Some(reason) = problem {
-            organ.complain(reason, &mut failed);
+            organ.report_failure(reason, &mut failed);
         }
     }
 }
@@ -124,7 +124,7 @@ impl PresetOrganItem<'_, '_> {
     }
 
     /// Reports that there is no preset, or that its file has become invalid.
-    fn complain(&self, reason: String, failed: &mut Announcer<GrowthFailed>) {
+    fn report_failure(&self, reason: String, failed: &mut Announcer<GrowthFailed>) {
         let organ = self.entity;
         if self.vasculature.is_some() {
             warn!("{organ}: its vessels stay as they are, since their preset cannot be loaded: {reason}");

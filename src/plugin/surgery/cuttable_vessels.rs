@@ -155,7 +155,7 @@ impl CuttableVessels {
     }
 
     /// Logs what could not be done, as a warning if the app's author must know it.
-    fn complain(&mut self, error: &OperationError) {
+    fn report_failure(&mut self, error: &OperationError) {
         match *error {
             // An instrument may miss: that is part of the game.
             OperationError::NothingNear { .. } => debug!("{error}"),
@@ -213,7 +213,7 @@ pub(crate) fn carry_out(
         let outcome = field.carry_out(&command, &mut door.history);
         door.done.extend(outcome.done);
         for error in outcome.errors {
-            door.complain(&error);
+            door.report_failure(&error);
             failed.write(VesselOperationFailed { command: command.clone(), error });
         }
     }
