@@ -29,7 +29,10 @@ use std::collections::BTreeMap;
 ///
 /// When the preset changes, in its file or in `Assets<PresetAsset>`, the vessels grow again. The organ's seed stays.
 /// The log names a file that cannot be loaded, and what is wrong with it. An organ that has vessels keeps them then;
-/// one that has none yet gets a [`GrowthFailed`]. Removing this leaves the vasculature as it is.
+/// one that has none yet gets a [`GrowthFailed`].
+///
+/// Whenever this is inserted or the preset is loaded, also with a scene, other changes of the vasculature are
+/// overwritten. To keep them, remove this: the vasculature stays as it is.
 ///
 /// ```
 /// # use bevy_vessels::plugin::VesselPreset;
