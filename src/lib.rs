@@ -1,6 +1,7 @@
 //! Procedural blood vessels for Bevy: arteries and veins that grow over an organ, or through it, while you watch.
 //!
-//! Add [`VesselPlugin`] to an app, and a [`Vasculature`](plugin::Vasculature) to any entity with a mesh:
+//! Add [`VesselPlugin`] to an app, and a [`Vasculature`](plugin::Vasculature) to any entity with a mesh. Plain shapes and
+//! images are [sources of tissue](synthesis::tissue::TissueSource), too, and need no mesh.
 //!
 //! ```
 //! # #[cfg(feature = "plugin")] {

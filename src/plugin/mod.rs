@@ -1,8 +1,9 @@
 //! ECS glue: vessels grow on organ entities, frame by frame. They can be cut, bleed, and follow their organ. No
 //! drawing.
 //!
-//! In: an entity with a `Mesh3d` and a [`Vasculature`]. Out: a vessel entity for each kind of vessels, child of the
-//! organ, with the tree in [`Vessels`] and its changes in [`ChangeLog`]; progress in [`GrowthProgress`] and messages.
+//! In: an entity with a [`Vasculature`], and a `Mesh3d`, an [`OrganImage`] or a plain shape as its tissue. Out: a vessel
+//! entity for each kind of vessels, child of the organ, with the tree in [`Vessels`] and its changes in [`ChangeLog`];
+//! progress in [`GrowthProgress`] and messages.
 //!
 //! Components on the organ add features beyond growth: [`Cuttable`] for surgery through [`CuttableVessels`],
 //! [`Perfusion`] for blood, [`FollowsMesh`] or [`FollowsTetrahedra`] for soft bodies. An organ without them has no cost

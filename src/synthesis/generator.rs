@@ -18,7 +18,7 @@ use std::{any::Any, fmt, sync::Arc};
 pub enum Generator {
     /// Space colonization: arteries and veins that grow towards drains (Rauch & Harders 2021).
     Colonization(ColonizationSettings),
-    /// A custom generator. It can't be written to a file.
+    /// A custom generator. It can't be written to a file: saving a preset or a scene that holds it is an error.
     #[cfg_attr(feature = "serialize", serde(skip))]
     Custom(CustomGenerator),
 }
@@ -143,9 +143,12 @@ impl From<ColonizationSettings> for Generator {
     }
 }
 
-/// A generator of vessels outside this crate, for [`CustomGenerator`].
+/// A generator of vessels outside this crate, for [`CustomGenerator`], which has an example.
 pub trait GrowthMaker: fmt::Debug + Send + Sync {
     /// The spacing of roots for each kind of vessels that it grows. All lengths must be multiplied by `scale`.
+    ///
+    /// For any other kind, users must ask for [no roots](crate::synthesis::roots::RootPlacement::None); by default there
+    /// are arteries and veins. Otherwise [`Roots::resolve`] fails.
     fn root_spacing(&self, scale: f32) -> ByKind<Option<RootSpacing>>;
 
     /// Starts a growth, with all lengths multiplied by `scale`: 1, or the
@@ -158,6 +161,72 @@ pub trait GrowthMaker: fmt::Debug + Send + Sync {
 }
 
 /// A custom generator of vessels. Two are equal if they share their maker and scale.
+///
+/// Make it once, and clone it: another one from [`new`](Self::new) counts as a changed setting, and starts the growth
+/// again.
+///
+/// ```
+/// use bevy_vessels::synthesis::{
+///     generator::{CustomGenerator, Generator, GrowthMaker},
+///     growth::{GrownTree, Growth, StepCount, TreeUpdate},
+///     roots::{RootPlacement, RootPlacements, RootSpacing, Roots},
+///     tissue::{Disc, Tissue},
+///     tree::{ByKind, NO_PARENT, VesselKind, VesselTree},
+/// };
+/// use std::sync::Arc;
+///
+/// /// Makes one straight artery, half the way from its root to the origin.
+/// #[derive(Debug)]
+/// struct Straight;
+///
+/// impl GrowthMaker for Straight {
+///     fn root_spacing(&self, scale: f32) -> ByKind<Option<RootSpacing>> {
+///         ByKind { artery: Some(RootSpacing { step: 0.1 * scale, reach: scale }), ..ByKind::default() }
+///     }
+///
+///     fn start(
+///         &self,
+///         tissue: Arc<dyn Tissue>,
+///         roots: &Roots,
+///         scale: f32,
+///         seed: u64,
+///     ) -> Result<Box<dyn Growth>, String> {
+///         let placed = roots.resolve(&*tissue, &self.root_spacing(scale), seed).map_err(|error| error.to_string())?;
+///         let root = placed.artery.first().ok_or("there is no arterial root; place one")?.position;
+///         let tree = VesselTree::from_arrays(vec![root, 0.5 * root], vec![NO_PARENT, 0], vec![0.01 * scale; 2]);
+///         Ok(Box::new(Done(tree.map_err(|error| error.to_string())?)))
+///     }
+/// }
+///
+/// /// A growth that needs no steps.
+/// #[derive(Debug)]
+/// struct Done(VesselTree);
+///
+/// impl Growth for Done {
+///     fn advance(&mut self) {}
+///     fn settle(&mut self) {}
+///     fn is_finished(&self) -> bool {
+///         true
+///     }
+///     fn progress(&self) -> StepCount {
+///         StepCount::default()
+///     }
+///     fn trees(&self) -> ByKind<Option<GrownTree<'_>>> {
+///         ByKind { artery: Some(GrownTree::of(&self.0)), ..ByKind::default() }
+///     }
+///     fn update(&self, _: VesselKind) -> TreeUpdate<'_> {
+///         TreeUpdate::Grown { changed: &[] }
+///     }
+/// }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let generator = Generator::Custom(CustomGenerator::new(Straight));
+/// let roots = RootPlacements { vein: RootPlacement::None, ..RootPlacements::default() };
+/// let growth = generator.start(Arc::new(Disc::flat(0.5)?), &roots.into(), 7)?;
+/// assert_eq!(growth.nodes(VesselKind::Artery), 2);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct CustomGenerator {

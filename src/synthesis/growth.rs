@@ -31,10 +31,11 @@ pub trait Growth: fmt::Debug + Send + Sync + Any {
         self.settle();
     }
 
-    /// Whether all steps are done.
+    /// Whether all steps are done. It must become true at last, since callers do steps until it is. It may be true from
+    /// the start.
     fn is_finished(&self) -> bool;
 
-    /// The number of steps done, and of all steps.
+    /// The number of steps done, which never falls, and of all steps.
     fn progress(&self) -> StepCount;
 
     /// The trees; `None` for a kind that has none. An empty tree has no root.
@@ -121,7 +122,7 @@ impl<'a> GrownTree<'a> {
 pub enum TreeUpdate<'a> {
     /// Nodes were appended, and some radii changed.
     Grown {
-        /// Nodes whose radius changed, new ones included, in any order.
+        /// Nodes whose radius changed, new ones included, in any order. Each must be in the tree.
         changed: &'a [u32],
     },
     /// It is another tree: nodes were inserted, moved or removed. Data that refers to old nodes, such as a wound, is

@@ -279,7 +279,11 @@ fn an_organ_without_perfusion_does_not_bleed_any_more() {
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &tube(40.0, 0.5, 4))], plain());
     app.update();
     cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
+    run_until(&mut app, "blood", |world| loss(world, organ).bleeding_ends == 2);
+    let mut stopped = MessageCursor::default();
+    drain::<BleedingStopped>(app.world(), &mut stopped);
     app.world_mut().entity_mut(organ).remove::<Perfusion>();
+    assert_eq!(drain::<BleedingStopped>(app.world(), &mut stopped).len(), 2);
     app.update();
     assert!(app.world().get::<BloodLoss>(organ).is_none());
     let ends = open_ends(&mut app);

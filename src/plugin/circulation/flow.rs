@@ -190,18 +190,23 @@ pub(crate) fn remove_circulation(
     organs: Query<&OrganVessels>,
     vessels: Query<&OpenEndEntities>,
     mut open_ends: Query<&mut OpenEnd>,
+    mut stopped: Announcer<BleedingStopped>,
     mut commands: Commands,
 ) {
-    let entities = organs.get(removed.entity).map_or(&[][..], OrganVessels::entities);
-    for &entity in entities {
-        commands.entity(entity).try_remove::<SegmentSupply>();
-        for (_, end) in vessels.get(entity).iter().flat_map(|ends| ends.iter()) {
-            if let Ok(mut end) = open_ends.get_mut(end) {
-                end.dry();
+    let organ = removed.entity;
+    let entities = organs.get(organ).map_or(&[][..], OrganVessels::entities);
+    for &vessel in entities {
+        commands.entity(vessel).try_remove::<SegmentSupply>();
+        for (id, entity) in vessels.get(vessel).iter().flat_map(|ends| ends.iter()) {
+            let Ok(mut end) = open_ends.get_mut(entity) else { continue };
+            if end.state == EndState::Bleeding {
+                let (side, entity) = (end.side, Some(entity));
+                stopped.announce(BleedingStopped { organ, vessels: vessel, end: id, side, entity });
             }
+            end.dry();
         }
     }
-    commands.entity(removed.entity).queue_silenced(|mut organ: EntityWorldMut| {
+    commands.entity(organ).queue_silenced(|mut organ: EntityWorldMut| {
         organ.remove::<(CirculationState, BloodLoss, OrganSupply)>();
     });
 }

@@ -16,6 +16,9 @@ use bevy::{
 /// starts the successors again. Until then [`GrowthProgress`](crate::plugin::GrowthProgress) is in
 /// [`GrowthPhase::Regrowing`](crate::plugin::GrowthPhase::Regrowing).
 ///
+/// If settings, seed or tissue change too, the vessels start again at once. Paint on vertices belongs to the mesh: give
+/// a mesh with another number of vertices its own paint in the same frame. Removing the component is blank paint.
+///
 /// Invalid paint, such as a density with too few values, ends in
 /// [`GrowthPhase::Failed`](crate::plugin::GrowthPhase::Failed). The vessels stay, and taking the stroke back is enough.
 ///

@@ -1,8 +1,8 @@
 //! The vessels that a user asks for on an organ.
 //!
-//! An organ is an entity with a mesh and a [`Vasculature`]. The plugin adds everything else. Each kind of vessels that
-//! has roots gets one vessel entity, a child of the organ, which carries the whole tree in
-//! [`Vessels`](crate::plugin::Vessels).
+//! An organ is an entity with a [`Vasculature`], and a mesh or an image unless its tissue is a plain shape. The plugin
+//! adds everything else. Each kind of vessels that has roots gets one vessel entity, a child of the organ, which carries
+//! the whole tree in [`Vessels`](crate::plugin::Vessels).
 
 use crate::plugin::{
     growth::{
@@ -24,10 +24,11 @@ use bevy::{
     transform::components::Transform,
 };
 
-/// The vessels to grow on an organ. Put it beside the organ's `Mesh3d`.
+/// The vessels to grow on an organ. Put it beside the organ's `Mesh3d`; if its [`tissue`](Self::tissue) is an image,
+/// beside an [`OrganImage`](crate::plugin::OrganImage). A plain shape needs neither.
 ///
 /// Changing any field starts the growth again at the next frame. The slow part, preparing the tissue, is repeated only
-/// if [`tissue`](Self::tissue) or the mesh changed. Removing the component removes the vessels.
+/// if [`tissue`](Self::tissue), the mesh or the image changed. Removing the component removes the vessels.
 ///
 /// With [`fit`](Self::fit) off, all lengths are in the local space of the mesh. With `fit` on, they are shares of the
 /// organ's size.

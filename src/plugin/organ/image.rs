@@ -17,7 +17,8 @@ use bevy::{
 /// The image that an organ's tissue is read from, if its [`Vasculature`](crate::plugin::Vasculature) has
 /// [`TissueSource::Image`](crate::synthesis::tissue::TissueSource::Image) as tissue. The organ needs no mesh then.
 ///
-/// Pictures become flat tissues; 3-D textures, and 2-D ones with several layers, become solids.
+/// Pictures become flat tissues; 3-D textures, and 2-D ones with several layers, become solids. The image must be
+/// uncompressed, and keep its data in main memory (`RenderAssetUsages::MAIN_WORLD`).
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct OrganImage(pub Handle<Image>);

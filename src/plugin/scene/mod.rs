@@ -1,29 +1,4 @@
 //! Scenes: presets as assets, and organs that are saved.
-//!
-//! # Presets
-//!
-//! [`PresetAsset`] is a [`Preset`](crate::synthesis::preset::Preset) from a file that ends in `.vessels.ron`. An organ
-//! with a [`VesselPreset`] gets its [`Vasculature`](crate::plugin::Vasculature) from it, and again whenever the file
-//! changes.
-//!
-//! # Saved organs
-//!
-//! An organ that Bevy saves in a scene, or clones, keeps everything that cannot be made again. Save its vessel entities
-//! with it:
-//!
-//! | component | what is kept |
-//! |---|---|
-//! | settings, such as [`Vasculature`](crate::plugin::Vasculature) and [`Perfusion`](crate::plugin::Perfusion) | everything |
-//! | [`GrowthProgress`](crate::plugin::GrowthProgress) | the number of steps, which are done at once after loading, as by [`GrowthAction::Finish`](crate::plugin::GrowthAction::Finish) |
-//! | [`Vessels`](crate::plugin::Vessels) that grew | their kind, and a hash: they grow again from mesh, settings and seed |
-//! | [`Vessels`](crate::plugin::Vessels) of a [given tree](crate::plugin::Vessels::from_tree) | everything, at rest |
-//! | [`VesselWounds`](crate::plugin::VesselWounds) | everything but the undo history; undoing all still heals them |
-//! | [`CirculationState`](crate::plugin::CirculationState) | how far open ends have clotted |
-//! | [`Patient`](crate::plugin::Patient), [`BloodLoss`](crate::plugin::BloodLoss) | everything |
-//! | [`OpenEnd`](crate::plugin::OpenEnd) entities | nothing: the wounds spawn them again |
-//!
-//! Wounds belong to their tree. If another tree grew because the mesh or the settings changed, they are dropped with a
-//! warning. A scene has no mesh that was not loaded from a file: give the organ its `Mesh3d` again.
 
 use crate::plugin::{
     growth::GrowthPlugin,
@@ -47,6 +22,36 @@ pub use preset_asset::{PresetAsset, PresetLoadError, PresetLoader};
 /// Loads presets as assets, and gives organs with a [`VesselPreset`] their vessels. Adds the [`GrowthPlugin`].
 ///
 /// Add it after `AssetPlugin`. Without that no presets are loaded.
+///
+/// # Presets
+///
+/// [`PresetAsset`] is a [`Preset`](crate::synthesis::preset::Preset) from a file that ends in `.vessels.ron`. An organ
+/// with a [`VesselPreset`] gets its [`Vasculature`](crate::plugin::Vasculature) from it, and again whenever the file
+/// changes.
+///
+/// # Saved organs
+///
+/// An organ that Bevy saves in a scene, or clones, keeps everything that cannot be made again. Save its vessel entities
+/// with it: those in its [`OrganVessels`](crate::plugin::OrganVessels). Extract these entities with Bevy's
+/// `DynamicWorldBuilder`; nothing else is needed.
+///
+/// | component | what is kept |
+/// |---|---|
+/// | settings, such as [`Vasculature`](crate::plugin::Vasculature), [`OrganPaint`](crate::plugin::OrganPaint) and [`Perfusion`](crate::plugin::Perfusion) | everything |
+/// | [`GrowthProgress`](crate::plugin::GrowthProgress) | the number of steps, which are done at once after loading |
+/// | [`Vessels`](crate::plugin::Vessels) that grew | their kind, and a hash: they grow again from mesh, settings and seed |
+/// | [`Vessels`](crate::plugin::Vessels) of a [given tree](crate::plugin::Vessels::from_tree) | everything, at rest |
+/// | [`VesselWounds`](crate::plugin::VesselWounds) | everything but the undo history; undoing all still heals them |
+/// | [`CirculationState`](crate::plugin::CirculationState) | how far open ends have clotted |
+/// | [`Patient`](crate::plugin::Patient), [`BloodLoss`](crate::plugin::BloodLoss) | everything |
+/// | [`OpenEnd`](crate::plugin::OpenEnd) entities | nothing: the wounds spawn them again |
+///
+/// Wounds belong to their tree. If another tree grew because the mesh or the settings changed, they are dropped with a
+/// warning. A scene has no mesh and no image that was not loaded from a file: give the organ its `Mesh3d` or
+/// [`OrganImage`](crate::plugin::OrganImage) again.
+///
+/// A [custom generator](crate::synthesis::generator::Generator::Custom) cannot be written. Leave the `Vasculature` of
+/// such an organ out of the scene, and insert it after loading.
 #[derive(Clone, Debug)]
 pub struct ScenePlugin {
     schedule: Interned<dyn ScheduleLabel>,

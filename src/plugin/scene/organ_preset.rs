@@ -31,6 +31,9 @@ use std::collections::BTreeMap;
 /// The log names a file that cannot be loaded, and what is wrong with it. An organ that has vessels keeps them then;
 /// one that has none yet gets a [`GrowthFailed`].
 ///
+/// Whenever this is inserted or the preset is loaded, also with a scene, other changes of the vasculature are
+/// overwritten. To keep them, remove this: the vasculature stays as it is.
+///
 /// ```
 /// # use bevy_vessels::plugin::VesselPreset;
 /// # use bevy::prelude::{AssetServer, Commands, Mesh3d, Res};

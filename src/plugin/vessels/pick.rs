@@ -97,8 +97,9 @@ impl PickableItem<'_, '_> {
 }
 
 impl VesselPicker<'_, '_> {
-    /// The nearest place of a remaining vessel to a point; `None` if no vessel's wall is within `reach`, which is
-    /// finite. World units.
+    /// The nearest place of a remaining vessel to a point; `None` if no vessel's wall is within `reach`. World units.
+    ///
+    /// `reach` must be finite: nothing is within an infinite one.
     ///
     /// Under a non-uniform scale, centre lines are where they are drawn, and radii use the mean scale, as for a cut.
     pub fn nearest(&self, point: Vec3, reach: f32) -> Option<VesselPlace> {
