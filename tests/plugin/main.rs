@@ -22,6 +22,7 @@ mod presets;
 mod registry;
 mod scene;
 mod sources;
+mod splitting;
 mod units;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};

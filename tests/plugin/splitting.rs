@@ -6,11 +6,12 @@ use super::*;
 use bevy::ecs::system::RunSystemOnce;
 use bevy_vessels::{
     plugin::{
-        BloodLoss, Cuttable, CuttableVessels, FollowsMesh, OpenEnd, VesselPicker, VesselPlace, VesselWounds,
+        BloodLoss, Cuttable, CuttableVessels, FollowsMesh, GrowthControl, OpenEnd, VesselPicker, VesselPlace,
+        VesselWounds,
     },
     synthesis::{
         generator::{CustomGenerator, Generator, GrowthMaker},
-        growth::{Growth, GrownTree, StepCount, TreeUpdate},
+        growth::{GrownTree, Growth, StepCount, TreeUpdate},
         roots::{RootPlacements, RootSpacing, Roots},
         tissue::Tissue,
         tree::{ByKind, NO_PARENT},
@@ -32,13 +33,7 @@ impl GrowthMaker for Splitter {
         ByKind::from_fn(|kind| KINDS.contains(&kind).then_some(RootSpacing { step: 0.01 * scale, reach: scale }))
     }
 
-    fn start(
-        &self,
-        tissue: Arc<dyn Tissue>,
-        roots: &Roots,
-        scale: f32,
-        seed: u64,
-    ) -> Result<Box<dyn Growth>, String> {
+    fn start(&self, tissue: Arc<dyn Tissue>, roots: &Roots, scale: f32, seed: u64) -> Result<Box<dyn Growth>, String> {
         let placed = roots.resolve(tissue.as_ref(), &self.root_spacing(scale), seed);
         let placed = placed.map_err(|error| error.to_string())?;
         let lines = placed.map(|_, roots| {
@@ -115,6 +110,8 @@ impl Growth for Splitting {
 
 /// An organ on which the splitter has started, and which waits.
 fn paused(app: &mut App, components: impl Bundle) -> Entity {
+    // Blood flows in vessels that grow only where their network is made at once.
+    app.insert_resource(JobSettings::default());
     let at = |x: f32| RootPlacement::Nearest(vec![Vec3::new(x, 0.5, 0.0)]);
     let roots = RootPlacements {
         artery: at(0.0),
@@ -141,7 +138,7 @@ fn lossless(world: &World, organ: Entity) -> bool {
 
 #[test]
 fn every_kind_is_published_anew_after_each_step() {
-    let mut app = operating_field(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = paused(&mut app, ());
     assert_eq!(vessel_entity(app.world(), organ, VesselKind::Vein), None);
     let entities = KINDS.map(|kind| vessel_entity(app.world(), organ, kind));
@@ -162,7 +159,7 @@ fn every_kind_is_published_anew_after_each_step() {
 
 #[test]
 fn a_replaced_tree_has_no_wounds_and_nothing_of_them_is_left() {
-    let mut app = operating_field(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = paused(&mut app, blood());
     cut(&mut app, square(Vec3::new(0.0, 0.1, 0.0), Vec3::Y, 3.0));
     assert!(KINDS.iter().all(|&kind| severed(app.world(), organ, kind).len() == 1));
@@ -190,7 +187,7 @@ fn a_replaced_tree_has_no_wounds_and_nothing_of_them_is_left() {
 
 #[test]
 fn a_replaced_tree_can_be_cut_and_bleeds_again() {
-    let mut app = operating_field(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = paused(&mut app, blood());
     for _ in 0..3 {
         send(&mut app, organ, GrowthAction::Step(1));
@@ -199,9 +196,9 @@ fn a_replaced_tree_can_be_cut_and_bleeds_again() {
         app.update();
         assert!(!lossless(app.world(), organ), "the cut vessels bleed");
         let tree = grown_tree(app.world(), organ, VesselKind::Artery);
-        let crossed = tree.segments().find(|&(node, parent)| {
-            (tree.positions()[node].y + 0.2) * (tree.positions()[parent].y + 0.2) < 0.0
-        });
+        let crossed = tree
+            .segments()
+            .find(|&(node, parent)| (tree.positions()[node].y + 0.2) * (tree.positions()[parent].y + 0.2) < 0.0);
         let severed = severed(app.world(), organ, VesselKind::Artery);
         assert_eq!(severed.first().map(|node| node.index()), crossed.map(|(node, _)| node));
     }
@@ -209,7 +206,7 @@ fn a_replaced_tree_can_be_cut_and_bleeds_again() {
 
 #[test]
 fn picking_finds_places_of_the_new_tree() {
-    let mut app = operating_field(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = paused(&mut app, ());
     let point = Vec3::new(0.02, -0.31, 0.0);
     let pick = move |picker: VesselPicker| -> Option<VesselPlace> { picker.nearest(point, 0.2) };
@@ -226,7 +223,7 @@ fn picking_finds_places_of_the_new_tree() {
 
 #[test]
 fn replaced_vessels_follow_a_deformed_organ() {
-    let mut app = operating_field(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = paused(&mut app, FollowsMesh);
     let mesh = app.world().get::<Mesh3d>(organ).map(|mesh| mesh.id()).expect("a mesh");
     let away = Vec3::new(3.0, 0.0, -1.0);
@@ -251,7 +248,7 @@ fn replaced_vessels_follow_a_deformed_organ() {
 
 #[test]
 fn a_restart_begins_with_the_first_line_again() {
-    let mut app = operating_field(FRAME);
+    let mut app = timed_app(FRAME);
     let organ = paused(&mut app, ());
     send(&mut app, organ, GrowthAction::Finish);
     app.update();
