@@ -217,3 +217,45 @@ fn the_prelude_has_thirty_names_at_most() {
         crate_root.uses.iter().filter(|import| import.is_public).map(|import| &*import.name).collect();
     assert!((1..=30).contains(&names.len()), "{} names in the prelude: {names:?}", names.len());
 }
+
+/// Files without a parent: the compiler begins with them.
+fn is_root(path: &str) -> bool {
+    let parts: Vec<&str> = path.split('/').collect();
+    matches!(parts[..], ["src", "lib.rs"] | ["tests" | "examples" | "benches", _] | ["tests", _, "main.rs"])
+}
+
+/// Files that no file beside or above them declares: they are never compiled, and their tests never run.
+fn undeclared(files: &[Source]) -> Vec<&str> {
+    let is_declared = |file: &Source| {
+        let module = file.path.trim_end_matches(".rs").trim_end_matches("/mod");
+        let (folder, name) = module.rsplit_once('/').unwrap_or(("", module));
+        let is_above = |other: &&Source| {
+            let place = other.path.rsplit_once('/').map_or("", |(place, _)| place);
+            other.path != file.path && format!("{folder}/").starts_with(&format!("{place}/"))
+        };
+        let declares =
+            |other: &Source| words(&other.text).windows(2).any(|pair| pair[0].1 == "mod" && pair[1].1 == name);
+        files.iter().filter(is_above).any(declares)
+    };
+    files.iter().filter(|file| !is_root(&file.path) && !is_declared(file)).map(|file| &*file.path).collect()
+}
+
+#[test]
+fn every_file_is_compiled() {
+    let files = sources(&["src", "examples", "tests", "benches"]);
+    let lost = undeclared(&files);
+    assert!(lost.is_empty(), "no file declares {lost:?}");
+}
+
+#[test]
+fn the_checks_find_a_file_that_is_not_compiled() {
+    let file = Source::new;
+    let files = [
+        file("tests/plugin/main.rs", "mod a; // mod lost;"),
+        file("tests/plugin/a.rs", ""),
+        file("tests/plugin/lost.rs", ""),
+        file("tests/tree.rs", "mod common;"),
+        file("tests/common/mod.rs", ""),
+    ];
+    assert_eq!(undeclared(&files), ["tests/plugin/lost.rs"]);
+}
