@@ -79,8 +79,7 @@ fn step(state: &mut GrowthState, progress: &mut GrowthProgress) {
     let cost = start.elapsed();
     state.note_step(cost);
     let grow_time = progress.grow_time + cost;
-    let phase = if state.successor().is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing };
-    *progress = GrowthProgress::of(phase, state.active(), grow_time);
+    *progress = GrowthProgress::of(phase_of_steps(state), state.active(), grow_time);
 }
 
 /// Brings an organ's radii up to date with its steps. A successor that has caught up replaces the drawn vessels.
@@ -89,10 +88,13 @@ fn settle(state: &mut GrowthState, progress: &mut GrowthProgress) {
     state.settle();
     let cost = start.elapsed();
     state.note_settling(cost);
-    progress.grow_time += cost;
-    if progress.phase == GrowthPhase::Regrowing && state.successor().is_none() {
-        progress.phase = GrowthPhase::Growing;
-    }
+    // Some generators make their trees only now.
+    *progress = GrowthProgress::of(phase_of_steps(state), state.active(), progress.grow_time + cost);
+}
+
+/// The phase of an organ that does steps.
+fn phase_of_steps(state: &GrowthState) -> GrowthPhase {
+    if state.successor().is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing }
 }
 
 /// Repeats the steps that an organ had done when it was saved, and returns their number.
