@@ -8,7 +8,7 @@ use crate::plugin::{
     announcer::Announcer,
     circulation::{
         gauge::Gauge,
-        messages::{BleedingMessages, BleedingStopped, CirculationFailed},
+        messages::{BleedingMessages, BleedingStopped, CirculationError, CirculationFailed},
         organ_flow::{OrganFlow, Trees},
         patient::{Patient, patient_of},
         perfused::{Perfused, PerfusedOrgan, PerfusedOrganItem, each_kind},
@@ -176,10 +176,9 @@ impl PerfusedOrganItem<'_, '_> {
         failed: &mut Announcer<CirculationFailed>,
     ) {
         let is_grown = self.state.made_for.is_some_and(|made_for| made_for.is_grown);
-        match made.map(|made| made.and_then(|flow| self.state.take(flow, is_grown))) {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => self.fail(error.into(), failed),
-            Err(panic) => self.fail(panic.into(), failed),
+        let taken = made.map_err(CirculationError::from).and_then(|made| Ok(self.state.take(made?, is_grown)?));
+        if let Err(error) = taken {
+            self.fail(error, failed);
         }
     }
 }

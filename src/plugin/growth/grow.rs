@@ -37,7 +37,7 @@ pub(crate) fn grow(
         steps += run_to_end(&mut state, &mut progress);
     }
     let waiting = organs.iter().filter(|(_, control, state, _)| state.may_step(**control));
-    let mut round: Vec<_> = waiting.map(|(organ, _, state, _)| (organ, state.expected_cost())).collect();
+    let mut round: Vec<_> = waiting.map(|(organ, _, state, _)| (organ, state.costs.expected())).collect();
     round.sort_unstable_by_key(|&(organ, _)| organ);
     begin_after(&mut round, *last);
     let started = frame.start_time;
@@ -49,7 +49,7 @@ pub(crate) fn grow(
             *last = Some(organ);
             let (_, control, mut state, mut progress) = organs.get_mut(organ).ok()?;
             step(&mut state, &mut progress);
-            state.may_step(*control).then(|| state.expected_cost())
+            state.may_step(*control).then(|| state.costs.expected())
         },
     );
     for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.is_unsettled()) {
@@ -77,9 +77,9 @@ fn step(state: &mut GrowthState, progress: &mut GrowthProgress) {
     let start = Instant::now();
     state.step();
     let cost = start.elapsed();
-    state.note_step(cost);
+    state.costs.note_step(cost);
     let grow_time = progress.grow_time + cost;
-    *progress = GrowthProgress::of(phase_of_steps(state), state.active(), grow_time);
+    *progress = GrowthProgress::of(state.phase_of_steps(), state.active(), grow_time);
 }
 
 /// Brings an organ's radii up to date with its steps. A successor that has caught up replaces the drawn vessels.
@@ -87,14 +87,9 @@ fn settle(state: &mut GrowthState, progress: &mut GrowthProgress) {
     let start = Instant::now();
     state.settle();
     let cost = start.elapsed();
-    state.note_settling(cost);
+    state.costs.note_settling(cost);
     // Some generators make their trees only now.
-    *progress = GrowthProgress::of(phase_of_steps(state), state.active(), progress.grow_time + cost);
-}
-
-/// The phase of an organ that does steps.
-fn phase_of_steps(state: &GrowthState) -> GrowthPhase {
-    if state.successor().is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing }
+    *progress = GrowthProgress::of(state.phase_of_steps(), state.active(), progress.grow_time + cost);
 }
 
 /// Repeats the steps that an organ had done when it was saved, and returns their number.

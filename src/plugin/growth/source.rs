@@ -255,8 +255,7 @@ impl OrganItem<'_, '_> {
         for warning in self.state.start(tissue, Preset::from(&*self.wish), self.wish.seed)? {
             warn!("{}: {warning}", self.entity);
         }
-        let phase = if self.state.successor().is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing };
-        self.enter(phase);
+        self.enter(self.state.phase_of_steps());
         Ok(true)
     }
 

@@ -346,11 +346,15 @@ impl GrowthState {
 
     /// The phase of a growth that has not failed.
     pub(crate) fn phase(&self) -> GrowthPhase {
-        match (self.successor(), self.growth()) {
-            (Some(_), _) => GrowthPhase::Regrowing,
-            (None, Some(growth)) if growth.is_finished() => GrowthPhase::Finished,
-            (None, _) => GrowthPhase::Growing,
+        match self.growth() {
+            Some(growth) if self.successor.is_none() && growth.is_finished() => GrowthPhase::Finished,
+            _ => self.phase_of_steps(),
         }
+    }
+
+    /// The phase of a growth that starts, or that has just done a step.
+    pub(crate) fn phase_of_steps(&self) -> GrowthPhase {
+        if self.successor.is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing }
     }
 
     /// Lineage of the tissue that it grows on. Each preparation changes it; paint does not.

@@ -1,7 +1,7 @@
 //! Steps of an organ's growth, with their costs and changes.
 
 use crate::plugin::{
-    growth::{budget::StepCost, progress::GrowthControl, state::GrowthState, successor::Successor},
+    growth::{progress::GrowthControl, state::GrowthState, successor::Successor},
     lineage::Lineage,
 };
 use crate::synthesis::{
@@ -93,21 +93,6 @@ impl GrowthState {
                 }
             }
         }
-    }
-
-    /// Records the cost of settling.
-    pub(crate) fn note_settling(&mut self, cost: Duration) {
-        self.costs.note_settling(cost);
-    }
-
-    /// Records the cost of a step.
-    pub(crate) fn note_step(&mut self, cost: Duration) {
-        self.costs.note_step(cost);
-    }
-
-    /// Expected cost of the next step.
-    pub(crate) fn expected_cost(&self) -> StepCost {
-        self.costs.expected()
     }
 
     /// Repeats the steps that were done before the organ was saved.
