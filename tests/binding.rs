@@ -1,5 +1,8 @@
 //! Vessels that follow an organ: rigid motions, stretching, bending, seams, tetrahedra, and errors.
 
+#[path = "common/solid_box.rs"]
+mod solid_box;
+
 use bevy_math::{Affine3A, Mat3, Quat, Vec3};
 use bevy_vessels::synthesis::{
     binding::{Binding, BindingError},
@@ -9,6 +12,7 @@ use bevy_vessels::synthesis::{
     tree::{NO_PARENT, NodeId, Place, VesselTree},
 };
 use rand::RngExt;
+use solid_box::solid_box;
 
 fn any_point(rng: &mut VesselRng) -> Vec3 {
     Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
@@ -189,38 +193,9 @@ fn seams_do_not_show() {
     assert!((left.z - 0.2).abs() < 2.0 * beside, "{left} left its distance");
 }
 
-/// A cube from −1 to 1 of n³ cells, five tetrahedra in each, or six.
-fn cube(n: u32) -> TetMesh {
-    let side = n + 1;
-    let number = |x: u32, y: u32, z: u32| x + side * (y + side * z);
-    let mut positions = Vec::new();
-    for z in 0..side {
-        for y in 0..side {
-            for x in 0..side {
-                positions.push(Vec3::new(x as f32, y as f32, z as f32) * (2.0 / n as f32) - 1.0);
-            }
-        }
-    }
-    let mut tetrahedra = Vec::new();
-    // Kuhn's six: along the edges of a cell from one corner to the opposite, in every order of the axes.
-    for cell in 0..n * n * n {
-        let corner = [cell % n, cell / n % n, cell / n / n];
-        for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-            let mut at = corner;
-            let mut path = vec![number(at[0], at[1], at[2])];
-            for axis in order {
-                at[axis] += 1;
-                path.push(number(at[0], at[1], at[2]));
-            }
-            tetrahedra.push([path[0], path[1], path[2], path[3]]);
-        }
-    }
-    TetMesh::new(positions, tetrahedra).expect("tetrahedra")
-}
-
 #[test]
 fn tetrahedra_carry_nodes_through_an_affine_map() {
-    let mesh = cube(5);
+    let mesh = solid_box(5, 2.0);
     let mut rng = Stream::Statistics.rng(8);
     // Some are outside, by up to half the width of the cube.
     let rest = chain((0..2000).map(|i| any_point(&mut rng) * if i % 5 == 0 { 1.5 } else { 1.0 }).collect());
@@ -239,7 +214,7 @@ fn tetrahedra_carry_nodes_through_an_affine_map() {
 
 #[test]
 fn a_node_in_tetrahedra_follows_only_the_one_that_holds_it() {
-    let mesh = cube(4);
+    let mesh = solid_box(4, 2.0);
     let rest = chain(vec![Vec3::new(-0.9, -0.8, -0.7), Vec3::new(0.8, 0.7, 0.9), Vec3::new(1.4, 0.8, 0.8)]);
     let mut binding = Binding::to_tetrahedra(&rest, &mesh);
     let lift = |p: &Vec3| if p.x >= 0.5 { *p + Vec3::Z } else { *p };

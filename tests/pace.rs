@@ -1,10 +1,13 @@
 //! Work with rests: equal results with any pauses, progress that rises to its end, and no long stretch without a rest.
 
+#[path = "common/solid_box.rs"]
+mod solid_box;
+
 use bevy_math::{UVec2, UVec3, Vec2, Vec3};
 use bevy_vessels::synthesis::{
     binding::Binding,
     haemodynamics::{BedSettings, Circulation, FlowSettings, Network, Supply, TissueSupply},
-    mesh::{IndexedMesh, TetMesh, TriangleIndex, TriangleMesh},
+    mesh::{IndexedMesh, TriangleIndex, TriangleMesh},
     pace::Pace,
     random::Stream,
     segment_index::SegmentIndex,
@@ -13,6 +16,7 @@ use bevy_vessels::synthesis::{
     units::Resistance,
 };
 use cpu_time::ThreadTime;
+use solid_box::solid_box;
 use std::{
     f32::consts::{PI, TAU},
     fmt::{self, Debug, Write},
@@ -43,26 +47,6 @@ fn ball(rings: u32) -> Arc<TriangleMesh> {
         [[a, b, b + 1], [a, b + 1, a + 1]]
     });
     Arc::new(TriangleMesh::new(positions, triangles.collect(), None).expect("a ball"))
-}
-
-/// A box of 5 · `side`³ tetrahedra.
-fn solid(side: u32) -> TetMesh {
-    let points = side + 1;
-    let point = |i: u32| Vec3::new((i % points) as f32, (i / points % points) as f32, (i / points / points) as f32);
-    let corner = |x: u32, y: u32, z: u32| (z * points + y) * points + x;
-    let cubes = (0..side).flat_map(|z| (0..side).flat_map(move |y| (0..side).map(move |x| (x, y, z))));
-    let tetrahedra = cubes.flat_map(|(x, y, z)| {
-        let c = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| corner(x + (i & 1), y + (i >> 1 & 1), z + (i >> 2)));
-        [
-            [c[0], c[1], c[2], c[4]],
-            [c[3], c[1], c[7], c[2]],
-            [c[5], c[1], c[4], c[7]],
-            [c[6], c[2], c[7], c[4]],
-            [c[1], c[2], c[4], c[7]],
-        ]
-    });
-    let positions = (0..points.pow(3)).map(|i| 2.0 * point(i) / side as f32 - 1.0).collect();
-    TetMesh::new(positions, tetrahedra.collect()).expect("a box")
 }
 
 /// A tree in the ball, each node near its parent.
@@ -296,7 +280,7 @@ fn paints(rings: u32) -> Vec<Case> {
 
 /// Of trees.
 fn products(nodes: usize) -> Vec<Case> {
-    let (mesh, solid, whole, vertices) = (ball(60), solid(16), tree(nodes, 0), tree(nodes / 2, 3));
+    let (mesh, solid, whole, vertices) = (ball(60), solid_box(16, 2.0), tree(nodes, 0), tree(nodes / 2, 3));
     let vertices = vertices.positions().to_vec();
     let (arteries, veins, links) = circulation(nodes);
     let joined = Circulation::new(arteries.clone(), veins.clone(), &links).expect("a circulation");

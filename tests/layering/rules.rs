@@ -2,7 +2,7 @@
 
 use crate::{
     rooms::parts_below,
-    source::{Source, words},
+    source::{Source, declared_modules, words},
     sources,
 };
 
@@ -233,8 +233,7 @@ fn undeclared(files: &[Source]) -> Vec<&str> {
             let place = other.path.rsplit_once('/').map_or("", |(place, _)| place);
             other.path != file.path && format!("{folder}/").starts_with(&format!("{place}/"))
         };
-        let declares =
-            |other: &Source| words(&other.text).windows(2).any(|pair| pair[0].1 == "mod" && pair[1].1 == name);
+        let declares = |other: &Source| declared_modules(&other.text).iter().any(|module| module == name);
         files.iter().filter(is_above).any(declares)
     };
     files.iter().filter(|file| !is_root(&file.path) && !is_declared(file)).map(|file| &*file.path).collect()

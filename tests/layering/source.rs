@@ -161,8 +161,8 @@ pub fn words(text: &str) -> Vec<(usize, &str)> {
 }
 
 /// The modules that a file declares itself.
-fn declared_modules(body: &str) -> Vec<String> {
-    words(body).windows(2).filter(|pair| pair[0].1 == "mod").map(|pair| pair[1].1.to_owned()).collect()
+pub fn declared_modules(code: &str) -> Vec<String> {
+    words(code).windows(2).filter(|pair| pair[0].1 == "mod").map(|pair| pair[1].1.to_owned()).collect()
 }
 
 /// All names of the `use` statements of a file.

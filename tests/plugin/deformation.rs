@@ -1,12 +1,16 @@
 //! Vessels follow a deformed organ, and are cut at their deformed positions.
 
+#[path = "../common/solid_box.rs"]
+mod solid_box;
+
 use super::operating_field::*;
 use super::*;
 use bevy::math::Affine3A;
 use bevy_vessels::{
     plugin::{ChangeLog, Cuttable, FollowsMesh, FollowsTetrahedra},
-    synthesis::{mesh::TetMesh, tissue::TissueMode, tree::NodeId},
+    synthesis::{tissue::TissueMode, tree::NodeId},
 };
+use solid_box::solid_box;
 
 const FRAME: Duration = Duration::from_millis(16);
 
@@ -197,32 +201,12 @@ fn an_unstable_soft_body_moves_nothing_and_does_not_stop_the_app() {
     assert_eq!(before, trees(app.world(), organ));
 }
 
-/// A box from −0.5 to 0.5, of n³ cells with six tetrahedra in each: Kuhn's, along the edges of a cell from one corner to the
-/// opposite, in every order of the axes.
-fn solid_box(n: u32) -> TetMesh {
-    let side = n + 1;
-    let number = |[x, y, z]: [u32; 3]| x + side * (y + side * z);
-    let cells = |n: u32| (0..n * n * n).map(move |cell| [cell % n, cell / n % n, cell / n / n]);
-    let positions = cells(side).map(|at| Vec3::from_array(at.map(|i| i as f32 / n as f32 - 0.5))).collect();
-    let tetrahedron = |mut at: [u32; 3], order: [usize; 3]| {
-        let mut corners = [number(at); 4];
-        for (corner, axis) in corners[1..].iter_mut().zip(order) {
-            at[axis] += 1;
-            *corner = number(at);
-        }
-        corners
-    };
-    let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-    let tetrahedra = cells(n).flat_map(|cell| orders.map(|order| tetrahedron(cell, order))).collect();
-    TetMesh::new(positions, tetrahedra).expect("tetrahedra")
-}
-
 /// Vessels through a box that follow its tetrahedra.
 fn solid(app: &mut App) -> Entity {
     let mut vasculature = quick();
     vasculature.tissue = TissueMode::Volume.into();
     let mesh = add_mesh(app, Cuboid::from_length(1.0));
-    let tetrahedra = FollowsTetrahedra::new(solid_box(4));
+    let tetrahedra = FollowsTetrahedra::new(solid_box(4, 1.0));
     let organ = app.world_mut().spawn((Mesh3d(mesh), vasculature, Cuttable::default(), tetrahedra)).id();
     run_to_phase(app, organ, GrowthPhase::Finished);
     (0..2).for_each(|_| app.update());
@@ -288,7 +272,7 @@ fn tetrahedra_may_be_replaced_and_taken_away() {
     move_tetrahedra(&mut app, organ, |at| at * f32::NAN);
     (0..2).for_each(|_| app.update());
     assert_eq!(before, trees(app.world(), organ), "an unstable soft body moves nothing");
-    let finer = FollowsTetrahedra::new(solid_box(5));
+    let finer = FollowsTetrahedra::new(solid_box(5, 1.0));
     app.world_mut().entity_mut(organ).insert(finer);
     app.update();
     assert_eq!(before, trees(app.world(), organ), "these are at rest");
