@@ -42,6 +42,9 @@ const LIFT: f32 = 0.0006;
 /// Factor by which the film is drawn deeper, so that its edge catches the light.
 const RELIEF: f32 = 1.6;
 
+/// Rounds of smoothing before the film is drawn: fewer leave jags where a deep pool spills over a ledge.
+const SMOOTHED: u32 = 8;
+
 /// The number of a cell outside the mesh.
 const NONE: u32 = u32::MAX;
 
@@ -238,7 +241,7 @@ impl Film {
     /// Depths to be drawn: means over neighbours, which hide the cells. Those on the rim are 0.
     fn smooth_depths(&self, cells: &[u32], inner: usize) -> Vec<f32> {
         let mut depths: Vec<f32> = cells.iter().map(|&cell| self.depths[cell as usize]).collect();
-        for _ in 0..3 {
+        for _ in 0..SMOOTHED {
             let before = depths.clone();
             for (depth, &cell) in depths[..inner].iter_mut().zip(cells) {
                 let around = self.skin.neighbours(cell).map(|other| before[self.numbers[other as usize] as usize]);
