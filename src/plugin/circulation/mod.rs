@@ -8,7 +8,7 @@ use bevy::{
     app::{App, Plugin, Update},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel},
+        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
     },
 };
 
@@ -60,6 +60,9 @@ impl Plugin for CirculationPlugin {
             .add_observer(flow::remove_circulation)
             .add_observer(flow::lay_again);
         let circulate = (flow::prepare_organs, flow::make_flow, bleeding::bleed, supply::measure_supply);
-        app.add_systems(self.schedule, circulate.chain().in_set(VesselSystems::Circulate));
+        app.add_systems(
+            self.schedule,
+            circulate.chain().in_set(VesselSystems::Circulate).run_if(any_with_component::<Perfusion>),
+        );
     }
 }

@@ -3,13 +3,14 @@
 use crate::plugin::{
     growth::source,
     order::{self, VesselSystems},
+    organ::rest::RestMesh,
     vessels::VesselsPlugin,
 };
 use bevy::{
     app::{App, Plugin, Update},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel},
+        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
     },
 };
 
@@ -44,12 +45,22 @@ impl Plugin for DeformationPlugin {
         order::configure(app, self.schedule);
         app.add_observer(follow::release_vessels::<FollowsMesh, FollowsTetrahedra>)
             .add_observer(follow::release_vessels::<FollowsTetrahedra, FollowsMesh>);
-        let follow = (follow::attach_bindings, (follow::follow_meshes, follow::follow_tetrahedra).chain());
+        let follow = (
+            follow::attach_bindings.run_if(any_with_component::<RestMesh>),
+            (
+                follow::follow_meshes.run_if(any_with_component::<FollowsMesh>),
+                follow::follow_tetrahedra.run_if(any_with_component::<FollowsTetrahedra>),
+            )
+                .chain(),
+        );
         app.add_systems(
             self.schedule,
             (
                 // The rest shape is taken when the tissue is prepared.
-                follow::take_rest.in_set(VesselSystems::Source).after(source::begin),
+                follow::take_rest
+                    .in_set(VesselSystems::Source)
+                    .after(source::begin)
+                    .run_if(any_with_component::<RestMesh>),
                 follow.chain().in_set(VesselSystems::Follow),
             ),
         );

@@ -176,5 +176,5 @@ impl<T> fmt::Debug for Job<T> {
 /// Registers what jobs need, with their system in a schedule.
 pub(crate) fn register(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
     app.init_resource::<JobSettings>().init_resource::<JobSlices>().register_type::<JobSettings>();
-    app.add_systems(schedule, slices::advance_slices.before(VesselSystems::Source));
+    app.add_systems(schedule, slices::advance_slices.before(VesselSystems::Source).run_if(slices::has_slices));
 }

@@ -123,6 +123,11 @@ impl JobSlices {
     }
 }
 
+/// Whether there are jobs that are done in slices.
+pub(crate) fn has_slices(slices: Res<JobSlices>) -> bool {
+    !lock(&slices.queue).is_empty()
+}
+
 /// Advances the jobs that are done in slices, at the start of a frame.
 pub(crate) fn advance_slices(settings: Res<JobSettings>, slices: Res<JobSlices>) {
     slices.advance(settings.slice_time);

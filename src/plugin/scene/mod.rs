@@ -6,10 +6,10 @@ use crate::plugin::{
 };
 use bevy::{
     app::{App, Plugin, Update},
-    asset::{AssetApp, AssetServer, Assets},
+    asset::{AssetApp, AssetServer},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::resource_exists},
+        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
     },
 };
 
@@ -83,7 +83,7 @@ impl Plugin for ScenePlugin {
         app.init_asset::<PresetAsset>().register_asset_reflect::<PresetAsset>().register_asset_loader(PresetLoader);
         app.add_systems(
             self.schedule,
-            organ_preset::follow_presets.before(VesselSystems::Source).run_if(resource_exists::<Assets<PresetAsset>>),
+            organ_preset::follow_presets.before(VesselSystems::Source).run_if(any_with_component::<VesselPreset>),
         );
     }
 }

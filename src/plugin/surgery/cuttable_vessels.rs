@@ -19,7 +19,7 @@ use crate::synthesis::{
 };
 use bevy::{
     ecs::{
-        change_detection::ResMut,
+        change_detection::{Res, ResMut},
         entity::Entity,
         message::{MessageReader, MessageWriter},
         resource::Resource,
@@ -221,9 +221,14 @@ pub(crate) fn carry_out(
     door.queue = queue;
 }
 
+impl CuttableVessels {
+    /// Whether operations are to be announced.
+    pub(crate) fn has_news(door: Res<Self>) -> bool {
+        !door.done.is_empty()
+    }
+}
+
 /// Cut: announces operations, once the entities of open ends exist.
 pub(crate) fn tell_operations(mut door: ResMut<CuttableVessels>, mut operations: Announcer<VesselOperation>) {
-    if !door.done.is_empty() {
-        door.done.drain(..).for_each(|operation| operations.announce(operation));
-    }
+    door.done.drain(..).for_each(|operation| operations.announce(operation));
 }

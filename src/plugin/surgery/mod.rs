@@ -2,13 +2,17 @@
 
 use crate::plugin::{
     order::{self, VesselSystems},
-    vessels::VesselsPlugin,
+    vessels::{OrganVessels, VesselWounds, VesselsPlugin},
 };
 use bevy::{
     app::{App, Plugin, Update},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel},
+        query::{Added, Changed, Or},
+        schedule::{
+            IntoScheduleConfigs, ScheduleLabel,
+            common_conditions::{any_match_filter, any_with_component},
+        },
     },
 };
 
@@ -59,14 +63,14 @@ impl Plugin for SurgeryPlugin {
             .add_observer(ledgers::remove_wounds)
             .add_observer(ledgers::forget_ledger);
         let cut = (
-            open_ends::despawn_strays,
-            ledgers::attach_wounds,
-            ledgers::clear_outdated,
-            ledgers::follow_settings,
+            open_ends::despawn_strays.run_if(any_match_filter::<Added<OpenEnd>>),
+            ledgers::attach_wounds.run_if(any_with_component::<Cuttable>),
+            ledgers::clear_outdated.run_if(any_with_component::<VesselWounds>),
+            ledgers::follow_settings.run_if(any_match_filter::<Or<(Changed<Cuttable>, Changed<OrganVessels>)>>),
             cuttable_vessels::carry_out,
-            open_ends::spawn_open_ends,
-            open_ends::move_open_ends,
-            cuttable_vessels::tell_operations,
+            open_ends::spawn_open_ends.run_if(any_match_filter::<Changed<VesselWounds>>),
+            open_ends::move_open_ends.run_if(any_with_component::<OpenEnd>),
+            cuttable_vessels::tell_operations.run_if(CuttableVessels::has_news),
         );
         app.add_systems(self.schedule, cut.chain().in_set(VesselSystems::Cut));
     }

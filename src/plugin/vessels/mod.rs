@@ -8,7 +8,8 @@ use bevy::{
     app::{App, Plugin, Update},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel},
+        query::{Added, Changed, Or},
+        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::any_match_filter},
     },
 };
 
@@ -69,8 +70,13 @@ impl Plugin for VesselsPlugin {
         app.add_systems(
             self.schedule,
             (
-                relations::mend_relations.before(VesselSystems::Source),
-                (appearance::show_kinds, tree::mark_replaced).in_set(VesselSystems::Publish),
+                relations::mend_relations
+                    .before(VesselSystems::Source)
+                    .run_if(any_match_filter::<Or<(Added<VesselsOf>, Added<OrganVessels>)>>),
+                appearance::show_kinds
+                    .in_set(VesselSystems::Publish)
+                    .run_if(any_match_filter::<Changed<VesselAppearance>>),
+                tree::mark_replaced.in_set(VesselSystems::Publish).run_if(any_match_filter::<Changed<Vessels>>),
                 index::index_vessels.after(VesselSystems::Follow).before(VesselSystems::Cut),
             ),
         );
