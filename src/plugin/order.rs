@@ -32,6 +32,9 @@ pub enum VesselSystems {
 }
 
 /// Puts the sets of a schedule in their order. The plugin of every room calls this; repeated calls change nothing.
+///
+/// No commands are applied between the sets, or between the systems of a room, but where a room says so with
+/// `ApplyDeferred`, and only in frames in which there may be some. Each application holds up all threads.
 pub(crate) fn configure(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
     app.configure_sets(
         schedule,
@@ -43,6 +46,6 @@ pub(crate) fn configure(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
             VesselSystems::Cut,
             VesselSystems::Circulate,
         )
-            .chain(),
+            .chain_ignore_deferred(),
     );
 }

@@ -3,12 +3,17 @@
 use crate::plugin::{
     order::{self, VesselSystems},
     surgery::SurgeryPlugin,
+    vessels::Vessels,
 };
 use bevy::{
     app::{App, Plugin, Update},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
+        query::{Added, Or, With, Without},
+        schedule::{
+            ApplyDeferred, IntoScheduleConfigs, ScheduleLabel,
+            common_conditions::{any_match_filter, any_with_component},
+        },
     },
 };
 
@@ -59,10 +64,16 @@ impl Plugin for CirculationPlugin {
             .add_message::<CirculationFailed>()
             .add_observer(flow::remove_circulation)
             .add_observer(flow::lay_again);
-        let circulate = (flow::prepare_organs, flow::make_flow, bleeding::bleed, supply::measure_supply);
+        let circulate = (
+            flow::prepare_organs,
+            ApplyDeferred.run_if(any_match_filter::<Or<(Added<Perfusion>, (With<Vessels>, Without<SegmentSupply>))>>),
+            flow::make_flow,
+            bleeding::bleed,
+            supply::measure_supply,
+        );
         app.add_systems(
             self.schedule,
-            circulate.chain().in_set(VesselSystems::Circulate).run_if(any_with_component::<Perfusion>),
+            circulate.chain_ignore_deferred().in_set(VesselSystems::Circulate).run_if(any_with_component::<Perfusion>),
         );
     }
 }

@@ -4,19 +4,24 @@ use crate::plugin::{
     growth::source,
     order::{self, VesselSystems},
     organ::rest::RestMesh,
-    vessels::VesselsPlugin,
+    vessels::{Vessels, VesselsPlugin},
 };
 use bevy::{
     app::{App, Plugin, Update},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
+        query::{With, Without},
+        schedule::{
+            ApplyDeferred, IntoScheduleConfigs, ScheduleLabel,
+            common_conditions::{any_match_filter, any_with_component},
+        },
     },
 };
 
 mod bound;
 pub(crate) mod follow;
 
+use bound::VesselBinding;
 pub use follow::{FollowsMesh, FollowsTetrahedra};
 
 /// Lets vessels follow organs with [`FollowsMesh`] or [`FollowsTetrahedra`].
@@ -46,12 +51,15 @@ impl Plugin for DeformationPlugin {
         app.add_observer(follow::release_vessels::<FollowsMesh, FollowsTetrahedra>)
             .add_observer(follow::release_vessels::<FollowsTetrahedra, FollowsMesh>);
         let follow = (
-            follow::attach_bindings.run_if(any_with_component::<RestMesh>),
+            (follow::attach_bindings, ApplyDeferred)
+                .chain_ignore_deferred()
+                .run_if(any_with_component::<RestMesh>)
+                .run_if(any_match_filter::<(With<Vessels>, Without<VesselBinding>)>),
             (
                 follow::follow_meshes.run_if(any_with_component::<FollowsMesh>),
                 follow::follow_tetrahedra.run_if(any_with_component::<FollowsTetrahedra>),
             )
-                .chain(),
+                .chain_ignore_deferred(),
         );
         app.add_systems(
             self.schedule,
@@ -59,9 +67,9 @@ impl Plugin for DeformationPlugin {
                 // The rest shape is taken when the tissue is prepared.
                 follow::take_rest
                     .in_set(VesselSystems::Source)
-                    .after(source::begin)
+                    .after_ignore_deferred(source::begin)
                     .run_if(any_with_component::<RestMesh>),
-                follow.chain().in_set(VesselSystems::Follow),
+                follow.chain_ignore_deferred().in_set(VesselSystems::Follow),
             ),
         );
     }

@@ -9,7 +9,7 @@ use bevy::{
     asset::{AssetEvent, Assets},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
+        schedule::{ApplyDeferred, IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
     },
     image::Image,
     log::warn,
@@ -92,14 +92,18 @@ impl Plugin for GrowthPlugin {
             source::receive_tissues,
             source::show_preparations,
         );
-        let publish = (publish::publish_vessels, grow::end_growths);
+        // The rooms that follow find the vessels of this frame.
+        let publish = (publish::publish_vessels, grow::end_growths, ApplyDeferred);
         app.add_systems(
             self.schedule,
             (
                 budget::begin_frame.before(VesselSystems::Source),
-                source.chain().in_set(VesselSystems::Source).run_if(any_with_component::<GrowthState>),
+                source.chain_ignore_deferred().in_set(VesselSystems::Source).run_if(any_with_component::<GrowthState>),
                 grow::grow.in_set(VesselSystems::Grow).run_if(any_with_component::<GrowthState>),
-                publish.chain().in_set(VesselSystems::Publish).run_if(any_with_component::<GrowthState>),
+                publish
+                    .chain_ignore_deferred()
+                    .in_set(VesselSystems::Publish)
+                    .run_if(any_with_component::<GrowthState>),
                 diagnostics::measure.in_set(VesselSystems::Publish).after(grow::end_growths),
             ),
         );

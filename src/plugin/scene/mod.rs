@@ -9,7 +9,7 @@ use bevy::{
     asset::{AssetApp, AssetServer},
     ecs::{
         intern::Interned,
-        schedule::{IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
+        schedule::{ApplyDeferred, IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
     },
 };
 
@@ -83,7 +83,10 @@ impl Plugin for ScenePlugin {
         app.init_asset::<PresetAsset>().register_asset_reflect::<PresetAsset>().register_asset_loader(PresetLoader);
         app.add_systems(
             self.schedule,
-            organ_preset::follow_presets.before(VesselSystems::Source).run_if(any_with_component::<VesselPreset>),
+            (organ_preset::follow_presets, ApplyDeferred)
+                .chain_ignore_deferred()
+                .before_ignore_deferred(VesselSystems::Source)
+                .run_if(any_with_component::<VesselPreset>),
         );
     }
 }

@@ -2,15 +2,15 @@
 
 use crate::plugin::{
     order::{self, VesselSystems},
-    vessels::{OrganVessels, VesselWounds, VesselsPlugin},
+    vessels::{OrganVessels, VesselWounds, Vessels, VesselsPlugin},
 };
 use bevy::{
     app::{App, Plugin, Update},
     ecs::{
         intern::Interned,
-        query::{Added, Changed, Or},
+        query::{Added, Changed, Or, With, Without},
         schedule::{
-            IntoScheduleConfigs, ScheduleLabel,
+            ApplyDeferred, IntoScheduleConfigs, ScheduleLabel,
             common_conditions::{any_match_filter, any_with_component},
         },
     },
@@ -64,14 +64,18 @@ impl Plugin for SurgeryPlugin {
             .add_observer(ledgers::forget_ledger);
         let cut = (
             open_ends::despawn_strays.run_if(any_match_filter::<Added<OpenEnd>>),
-            ledgers::attach_wounds.run_if(any_with_component::<Cuttable>),
+            (ledgers::attach_wounds, ApplyDeferred)
+                .chain_ignore_deferred()
+                .run_if(any_match_filter::<(With<Vessels>, Or<(Without<VesselWounds>, Without<OpenEndEntities>)>)>),
             ledgers::clear_outdated.run_if(any_with_component::<VesselWounds>),
             ledgers::follow_settings.run_if(any_match_filter::<Or<(Changed<Cuttable>, Changed<OrganVessels>)>>),
             cuttable_vessels::carry_out,
-            open_ends::spawn_open_ends.run_if(any_match_filter::<Changed<VesselWounds>>),
+            (open_ends::spawn_open_ends, ApplyDeferred)
+                .chain_ignore_deferred()
+                .run_if(any_match_filter::<Changed<VesselWounds>>),
             open_ends::move_open_ends.run_if(any_with_component::<OpenEnd>),
             cuttable_vessels::tell_operations.run_if(CuttableVessels::has_news),
         );
-        app.add_systems(self.schedule, cut.chain().in_set(VesselSystems::Cut));
+        app.add_systems(self.schedule, cut.chain_ignore_deferred().in_set(VesselSystems::Cut));
     }
 }

@@ -71,7 +71,7 @@ impl Plugin for VesselsPlugin {
             self.schedule,
             (
                 relations::mend_relations
-                    .before(VesselSystems::Source)
+                    .before_ignore_deferred(VesselSystems::Source)
                     .run_if(any_match_filter::<Or<(Added<VesselsOf>, Added<OrganVessels>)>>),
                 appearance::show_kinds
                     .in_set(VesselSystems::Publish)
