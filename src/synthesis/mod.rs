@@ -64,6 +64,7 @@ pub mod random;
 pub mod roots;
 pub mod segment_index;
 pub mod space;
+pub mod surface;
 pub mod tissue;
 pub mod tree;
 pub mod units;

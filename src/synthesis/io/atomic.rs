@@ -15,6 +15,16 @@ pub enum WriteError {
         /// The path given.
         path: PathBuf,
     },
+    /// The path's extension belongs to no format that can be written.
+    #[error("cannot write {}: {}; surfaces are written as {known}", path.display(), unknown(extension))]
+    UnknownExtension {
+        /// The path given.
+        path: PathBuf,
+        /// Its extension without the dot, empty if it has none.
+        extension: String,
+        /// The known extensions.
+        known: String,
+    },
     /// No file can be created in the folder: it is missing, or the user has no permission.
     #[error("cannot create a file beside {}: {source}", path.display())]
     Create {
@@ -39,6 +49,13 @@ pub enum WriteError {
         /// The system's error.
         source: io::Error,
     },
+}
+
+fn unknown(extension: &str) -> String {
+    match extension {
+        "" => "it has no extension".to_owned(),
+        other => format!("\".{other}\" is no known extension"),
+    }
 }
 
 /// Writes a file so that its path always holds either the old or the whole new content.

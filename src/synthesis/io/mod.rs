@@ -1,5 +1,6 @@
-//! Files: trees are written as SWC, OBJ and CSV, and read from SWC; organ meshes are read from GLB, glTF and OBJ with the
-//! feature `mesh_files`.
+//! Files: trees are written as SWC, OBJ and CSV, and read from SWC; closed surfaces of vessels are
+//! written as GLB, STL, PLY, OBJ and OFF; organ meshes are read from GLB, glTF and OBJ. GLB, and the reading of meshes,
+//! need the feature `mesh_files`.
 //!
 //! Every format has a function that writes to any [`std::io::Write`], such as [`write_swc`], and one that writes a
 //! file, such as [`save_swc`]. Files are written whole or not at all, by [`write_atomically`].
@@ -26,12 +27,19 @@
 
 mod atomic;
 mod mesh;
+mod surface;
 mod tree;
 
 pub use atomic::{WriteError, write_atomically};
 #[cfg(feature = "mesh_files")]
 pub use mesh::{MeshReadError, load_mesh, read_glb, read_obj_mesh};
 pub use mesh::{ObjOptions, save_obj, write_obj};
+pub use surface::{
+    SurfaceFormat, SurfaceOptions, SurfacePart, save_surface, save_surface_obj, save_surface_off, save_surface_ply,
+    save_surface_stl, write_surface, write_surface_obj, write_surface_off, write_surface_ply, write_surface_stl,
+};
+#[cfg(feature = "mesh_files")]
+pub use surface::{save_surface_glb, write_surface_glb};
 pub use tree::{
     ReadError, SwcOptions, SwcReadOptions, kind_of_swc_structure, load_swc, read_swc, save_csv, save_swc,
     swc_structure, write_csv, write_swc,

@@ -58,8 +58,8 @@ impl Bounds {
     }
 
     /// Whether two boxes share a point.
-    fn overlaps(&self, other: &Self) -> bool {
-        self.min.cmple(other.max).all() && self.max.cmpge(other.min).all()
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+        (self.min.cmple(other.max) & self.max.cmpge(other.min)).all()
     }
 
     /// Parameter at which a line enters the box, at or after 0 and before `limit`. `inverse` is 1 / direction.

@@ -1,15 +1,17 @@
-//! The side of a plane on which a point lies, exact despite rounding.
+//! The side of a plane, or of a line in the plane, on which a point lies, exact despite rounding.
 //!
-//! In: four points in f32. Out: the determinant of Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast
+//! In: four points in f32, or three in the plane. Out: the determinant of Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast
 //! Robust Geometric Predicates" (1997), whose sign is always right and is zero only for points in one plane. The plain
 //! f64 value is used if his error bound (section 4.3) allows it; otherwise the sum is computed as an expansion, without
 //! rounding. Since the points are f32, each product of two coordinates is exact in f64 and each product of three is the
 //! sum of two f64, so one stage of expansion suffices, whereas his f64 points need three.
 
-use bevy_math::{DVec3, Vec3};
+use bevy_math::{DVec3, Vec2, Vec3};
 
 /// Bound of the rounding error of the plain determinant, as a multiple of its permanent: (7 + 56 ε) ε, ε = 2⁻⁵³.
 const ERROR: f64 = (7.0 + 56.0 * HALF_ULP) * HALF_ULP;
+/// The same for three points in the plane: (3 + 16 ε) ε.
+const FLAT_ERROR: f64 = (3.0 + 16.0 * HALF_ULP) * HALF_ULP;
 const HALF_ULP: f64 = f64::EPSILON / 2.0;
 /// Ratio to its error bound from which the plain value is used. It then has 26 bits, two more than a stored share of a
 /// segment.
@@ -33,7 +35,28 @@ pub(crate) fn orientation(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
     if determinant.abs() > bound { determinant } else { exact(a, b, c, d) }
 }
 
-/// The same, rounded only in the last step.
+/// Twice the signed area of the triangle of three points: positive if they run anticlockwise; zero exactly if all three
+/// lie on one line.
+///
+/// The sign is exact for all finite points; the value has a relative error below 2⁻²⁶.
+pub(crate) fn orientation_2d(a: Vec2, b: Vec2, c: Vec2) -> f64 {
+    let [a, b, c] = [a, b, c].map(|point| point.as_dvec2());
+    let (ac, bc) = (a - c, b - c);
+    let (left, right) = (ac.x * bc.y, ac.y * bc.x);
+    let determinant = left - right;
+    if determinant.abs() > FLAT_ERROR * TRUSTED * (left.abs() + right.abs()) {
+        return determinant;
+    }
+    let mut sum = Expansion { parts: [0.0; TERMS], len: 0 };
+    // Each product is exact in f64.
+    for (u, v) in [(a, b), (b, c), (c, a)] {
+        sum.add(u.x * v.y);
+        sum.add(-u.y * v.x);
+    }
+    sum.value()
+}
+
+/// The determinant of four points, rounded only in the last step.
 fn exact(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> f64 {
     let mut sum = Expansion { parts: [0.0; TERMS], len: 0 };
     // det(a−d, b−d, c−d) = [abc] − [bcd] + [cda] − [dab]
@@ -100,7 +123,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 mod tests {
     use crate::synthesis::random::Stream;
     use crate::synthesis::space::exact_side::*;
-    use bevy_math::{I64Vec3, vec3};
+    use bevy_math::{I64Vec2, I64Vec3, vec2, vec3};
     use rand::RngExt;
 
     /// The determinant in whole numbers.
@@ -134,6 +157,34 @@ mod tests {
             assert!(error <= 2f64.powi(-26) * (expected as f64).abs(), "{points:?}: {found}, not {expected}");
         }
         assert!(flat > 1_000, "only {flat} flat cases");
+    }
+
+    #[test]
+    fn area_in_the_plane_equals_that_in_whole_numbers() {
+        let mut rng = Stream::Statistics.rng(2);
+        let mut flat = 0;
+        for round in 0..60_000 {
+            let limit = [2, 40, (1 << 22) - 1][round % 3];
+            let mut points: [I64Vec2; 3] =
+                std::array::from_fn(|_| I64Vec2::from_array(std::array::from_fn(|_| rng.random_range(-limit..=limit))));
+            if round % 5 == 0 {
+                points[2] = 2 * points[1] - points[0] + I64Vec2::new(0, rng.random_range(-1..=1));
+            }
+            let [ac, bc] = [points[0] - points[2], points[1] - points[2]].map(|v| v.to_array().map(i128::from));
+            let expected = ac[0] * bc[1] - ac[1] * bc[0];
+            let [a, b, c] = points.map(|point| point.as_vec2());
+            let found = orientation_2d(a, b, c);
+            flat += u32::from(expected == 0);
+            assert_eq!(found == 0.0, expected == 0, "{points:?}");
+            let error = (found - expected as f64).abs();
+            assert!(error <= 2f64.powi(-26) * (expected as f64).abs(), "{points:?}: {found}, not {expected}");
+        }
+        assert!(flat > 1_000, "only {flat} flat cases");
+        // One unit in the last place off a line, with coordinates of very different size.
+        let [a, b] = [vec2(0.0, 0.0), vec2(1e30, 3e-30)];
+        assert_eq!(orientation_2d(a, b, b / 2.0), 0.0);
+        assert!(orientation_2d(a, b, vec2(b.x / 2.0, (b.y / 2.0).next_up())) > 0.0);
+        assert!(orientation_2d(a, b, vec2(b.x / 2.0, (b.y / 2.0).next_down())) < 0.0);
     }
 
     #[test]

@@ -1,0 +1,66 @@
+//! The surface of a tree, with a report of what was done.
+
+use super::builder::Builder;
+use super::half_edges::HalfEdges;
+use super::mesh::{SurfaceMesh, assemble};
+use super::report::SurfaceReport;
+use super::settings::{SurfaceError, SurfaceSettings};
+use super::shape::Shape;
+use crate::synthesis::pace::{Pace, at_once};
+use crate::synthesis::tree::VesselTree;
+use bevy_math::Vec3;
+
+/// The surface of a tree, and what was done for it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// The mesh.
+    pub mesh: SurfaceMesh,
+    /// What was done.
+    pub report: SurfaceReport,
+}
+
+impl Surface {
+    /// The surface of a tree; without vertices for an empty one.
+    ///
+    /// # Errors
+    /// Settings out of their limits, and more faces than 32-bit indices can count.
+    pub fn new(tree: &VesselTree, settings: &SurfaceSettings) -> Result<Self, SurfaceError> {
+        at_once(Self::new_paced(tree, settings, &Pace::default()))
+    }
+
+    /// The same as [paced](crate::synthesis::pace) work.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub async fn new_paced(tree: &VesselTree, settings: &SurfaceSettings, pace: &Pace) -> Result<Self, SurfaceError> {
+        settings.validate()?;
+        let widest = tree.radii().iter().copied().fold(0.0, f32::max);
+        let shape = Shape::new(settings, widest);
+        // Coordinates from the middle of the tree: rounding doesn't depend on where the organ lies.
+        let origin = middle(tree.positions());
+        let (cage, report) = Builder::new(tree, &shape, settings.tips, origin).build_paced(&pace.part(0.0..0.3)).await;
+        let faces = cage.corners.len() as u64 * 4u64.pow(settings.level.saturating_sub(1));
+        if 2 * faces > u64::from(u32::MAX) {
+            return Err(SurfaceError::TooManyFaces { faces });
+        }
+        let mut half_edges = HalfEdges::of_paced(cage, &pace.part(0.3..0.4)).await;
+        for _ in 0..settings.level {
+            half_edges = half_edges.refined_paced(&pace.part(0.4..0.6)).await;
+        }
+        let (mut positions, normals) = if settings.level > 0 {
+            half_edges.limits_paced(&pace.part(0.6..0.8)).await
+        } else {
+            (half_edges.vertices.positions.clone(), half_edges.face_normals())
+        };
+        positions.iter_mut().for_each(|position| *position += origin);
+        let mesh = assemble(half_edges, positions, normals, &pace.part(0.8..1.0)).await;
+        Ok(Self { mesh, report })
+    }
+}
+
+/// The middle of the box around some points.
+fn middle(points: &[Vec3]) -> Vec3 {
+    let Some(&first) = points.first() else { return Vec3::ZERO };
+    let (low, high) = points.iter().fold((first, first), |(low, high), &point| (low.min(point), high.max(point)));
+    low.midpoint(high)
+}

@@ -1,0 +1,225 @@
+//! Makes the cage of a tree.
+//!
+//! In: a tree. Out: a [`Cage`], closed by construction: every edge is made together with both of its faces. Trunk by
+//! trunk, rings are joined by belts of quads. Each row leaves holes in its belts, one for each lateral, and the lateral's
+//! first belt begins at the hole's edge: the branches connection of Skjermo & Eidheim 2005. Their tiles are single faces;
+//! here, a hole of w × w faces lets a lateral of 4w sides out.
+
+use super::cage::Cage;
+use super::caps;
+use super::columns::Columns;
+use super::curve::{Curve, Lean, across};
+use super::exit::Exit;
+use super::report::SurfaceReport;
+use super::rings::{Ring, Rings, Start};
+use super::rows::{Opening, Row, rows};
+use super::settings::TipCap;
+use super::shape::Shape;
+use super::trunks::{Base, Trunks, unit};
+use crate::synthesis::pace::{Pace, SHORT_STRETCH};
+use crate::synthesis::tree::{NodeId, VesselTree};
+use bevy_math::{Vec3, ops};
+use std::f32::consts::FRAC_PI_4;
+
+/// What a trunk leaves to a lateral.
+#[derive(Clone, Debug)]
+enum Hole {
+    /// The lateral's tube begins here.
+    Open {
+        start: Start,
+        right: Vec3,
+        lean: Lean,
+        /// The vertices around the hole, those of the lateral's first ring in their order.
+        edge: Vec<u32>,
+    },
+    /// The lateral ends within the trunk's lumen.
+    Absorbed,
+}
+
+/// Makes a cage trunk by trunk.
+pub(super) struct Builder<'a> {
+    shape: &'a Shape,
+    tips: TipCap,
+    trunks: Trunks,
+    curves: Vec<Curve>,
+    holes: Vec<Option<Hole>>,
+    cage: Cage,
+    rings: Rings,
+    exits: Vec<Exit>,
+    /// First vertex of each ring.
+    bases: Vec<u32>,
+    report: SurfaceReport,
+}
+
+impl<'a> Builder<'a> {
+    /// A builder of the cage of a tree, in coordinates from an origin.
+    pub fn new(tree: &VesselTree, shape: &'a Shape, tips: TipCap, origin: Vec3) -> Self {
+        let trunks = Trunks::of(tree);
+        let curves = (0..trunks.len())
+            .map(|trunk| {
+                let mut curve = Curve::default();
+                curve.set(tree, trunks.nodes(trunk), trunks.base(trunk) != Base::Root, origin);
+                curve
+            })
+            .collect();
+        let holes = vec![None; trunks.len()];
+        let cage = Cage { starts: vec![0], ..Cage::default() };
+        Self {
+            shape,
+            tips,
+            trunks,
+            curves,
+            holes,
+            cage,
+            rings: Rings::default(),
+            exits: Vec::new(),
+            bases: Vec::new(),
+            report: SurfaceReport::default(),
+        }
+    }
+
+    /// The whole cage, as paced work.
+    pub async fn build_paced(mut self, pace: &Pace) -> (Cage, SurfaceReport) {
+        pace.stretches(self.trunks.len(), SHORT_STRETCH, |trunks| trunks.for_each(|trunk| self.add(trunk))).await;
+        self.cage.drop_unused();
+        (self.cage, self.report)
+    }
+
+    /// Adds a trunk whose base's trunk has been added.
+    fn add(&mut self, trunk: usize) {
+        let hole = self.holes[trunk].take();
+        let (start, edge) = match hole {
+            Some(Hole::Absorbed) => {
+                let tip = self.trunks.nodes(trunk).last().copied();
+                self.report.absorbed.extend(tip.map(NodeId));
+                return;
+            }
+            Some(Hole::Open { start, right, lean, edge }) => {
+                self.curves[trunk].set_right(start.length, right);
+                self.curves[trunk].set_lean(lean);
+                (start, Some(edge))
+            }
+            None => {
+                let sides = self.shape.sides_of(self.curves[trunk].radius_at(0.0));
+                (Start { length: 0.0, normal: Vec3::ZERO, columns: Columns::even(sides, FRAC_PI_4), sides }, None)
+            }
+        };
+        let curve = &self.curves[trunk];
+        self.exits.clear();
+        for &lateral in self.trunks.laterals(trunk) {
+            let Base::Joint { at, .. } = self.trunks.base(lateral as usize) else { continue };
+            let branch = &self.curves[lateral as usize];
+            let exit = Exit::new(lateral, curve, curve.length_of(at as usize), branch);
+            self.report.laterals += 1;
+            let ends_within = self.trunks.laterals(lateral as usize).is_empty() && exit.ends_within(curve, branch);
+            if ends_within {
+                self.holes[lateral as usize] = Some(Hole::Absorbed);
+            } else {
+                self.exits.push(exit);
+            }
+        }
+        let from = start.length + if edge.is_some() { 0.3 * curve.radius_at(start.length) } else { 0.0 };
+        let mut rows = rows(curve, &self.exits, self.shape, from, curve.length());
+        self.rings.lay(curve, &start, &mut rows, self.shape);
+        self.add_rings(trunk);
+        self.add_belts(&rows);
+        self.add_ends(trunk, edge);
+        self.open_holes(trunk, &rows);
+    }
+
+    /// Vertices of all rings.
+    fn add_rings(&mut self, trunk: usize) {
+        self.bases.clear();
+        let (curve, nodes) = (&self.curves[trunk], self.trunks.nodes(trunk));
+        for ring in &self.rings.rings {
+            let node = nodes[curve.place_at(ring.length)];
+            self.bases.push(self.cage.vertices.positions.len() as u32);
+            let radius = ring.station.radius;
+            let wide = radius * self.shape.swell(ring.sides);
+            for side in 0..ring.sides {
+                let (sine, cosine) = ops::sin_cos(self.rings.angles[(ring.first_angle + side) as usize]);
+                self.cage.vertices.push(ring.point([cosine, sine], wide), radius, node);
+            }
+        }
+    }
+
+    /// Faces between rings, without those of openings.
+    fn add_belts(&mut self, rows: &[Row]) {
+        let mut row = 0;
+        for belt in 0..self.rings.rings.len() - 1 {
+            while row < rows.len() && belt >= (self.rings.of_rows[row] + rows[row].width) as usize {
+                row += 1;
+            }
+            let line = (belt as u32).checked_sub(self.rings.of_rows.get(row).copied().unwrap_or(u32::MAX));
+            let openings = if line.is_some() { &rows[row].openings[..] } else { &[] };
+            let width = rows.get(row).map_or(0, |row| row.width);
+            let is_open = |column: u32, sides: u32| {
+                openings.iter().any(|opening| {
+                    let lowest = (width - opening.width) / 2;
+                    let is_in_line = line.is_some_and(|line| (lowest..lowest + opening.width).contains(&line));
+                    is_in_line && (column + sides - opening.column) % sides < opening.width
+                })
+            };
+            self.cage.belt(&self.rings.rings[belt..belt + 2], &self.bases[belt..belt + 2], is_open);
+        }
+    }
+
+    /// The first belt of a lateral from its hole's edge, or a root's end; and the tip's end.
+    fn add_ends(&mut self, trunk: usize, edge: Option<Vec<u32>>) {
+        let (curve, nodes) = (&self.curves[trunk], self.trunks.nodes(trunk));
+        let first = self.rings.rings[0];
+        match edge {
+            Some(edge) => self.cage.sleeve(&edge, &first, self.bases[0]),
+            None => caps::add(&mut self.cage, &first, self.bases[0], caps::End::Base, TipCap::Round, nodes[0]),
+        }
+        let last = self.rings.rings.len() - 1;
+        let node = nodes[curve.place_at(curve.length())];
+        let ring = self.rings.rings[last];
+        caps::add(&mut self.cage, &ring, self.bases[last], caps::End::Tip, self.tips, node);
+    }
+
+    /// Tells the laterals where their holes are.
+    fn open_holes(&mut self, trunk: usize, rows: &[Row]) {
+        for (number, row) in rows.iter().enumerate() {
+            let first = self.rings.of_rows[number];
+            let ring = self.rings.rings[(first + row.width / 2) as usize];
+            for opening in &row.openings {
+                let exit = self.exits[opening.exit as usize];
+                let edge = self.edge_of(first + (row.width - opening.width) / 2, opening, row.sides);
+                let hole = self.hole(trunk, &ring, row, &exit, opening, edge);
+                self.holes[exit.lateral as usize] = Some(hole);
+            }
+        }
+    }
+
+    /// The vertices around an opening, anticlockwise from its first corner.
+    fn edge_of(&self, ring: u32, opening: &Opening, sides: u32) -> Vec<u32> {
+        let width = opening.width;
+        let vertex = |across: u32, along: u32| self.bases[(ring + along) as usize] + (opening.column + across) % sides;
+        let lower = (0..width).map(|step| vertex(step, 0));
+        let right = (0..width).map(|step| vertex(width, step));
+        let upper = (0..width).map(|step| vertex(width - step, width));
+        let left = (0..width).map(|step| vertex(0, width - step));
+        lower.chain(right).chain(upper).chain(left).collect()
+    }
+
+    fn hole(&self, trunk: usize, ring: &Ring, row: &Row, exit: &Exit, opening: &Opening, edge: Vec<u32>) -> Hole {
+        let station = self.curves[trunk].at(row.length);
+        let branch = &self.curves[exit.lateral as usize];
+        let middle =
+            edge.iter().map(|&vertex| self.cage.vertices.positions[vertex as usize]).sum::<Vec3>() / edge.len() as f32;
+        let out = across(middle - station.center, station.ahead);
+        let wide = ring.station.radius * self.shape.apothem(row.sides);
+        let point = station.center + out * ring.station.radius;
+        let lift = exit.lift(branch, &station, wide);
+        let shift = point - exit.point;
+        let shift = shift - out * shift.dot(out);
+        let reach = (4.0 * shift.length()).max(2.0 * exit.radius);
+        let lean = Lean { shift, from: lift, to: lift + reach };
+        let begin = branch.at(lift);
+        let normal = unit(begin.ahead + out).unwrap_or(begin.ahead);
+        let sides = 4 * opening.width;
+        let start = Start { length: lift, normal, columns: Columns::even(sides, -3.0 * FRAC_PI_4), sides };
+        Hole::Open { start, right: station.ahead.cross(out), lean, edge }
+    }
+}

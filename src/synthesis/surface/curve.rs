@@ -1,0 +1,345 @@
+//! The centre line of a trunk: a smooth curve through its nodes, with its radius and with frames that hardly turn.
+//!
+//! In: a trunk's nodes. Out: [`Station`]s at any length along it. Nodes closer than a radius to the one before are left
+//! out: vessels that grow while branches leave them zigzag within their own width. Between the nodes that stay, the
+//! curve is a cubic Hermite spline with unit speed at the nodes; the radius is that of the round cones.
+
+use super::trunks::unit;
+use crate::synthesis::{segment_index::MAX_FLARE, tree::VesselTree};
+use bevy_math::{Quat, Vec3};
+
+/// Distance between kept nodes, in radii.
+const SPACING: f32 = 1.0;
+/// Segments shorter than this share of the radius have no direction of their own.
+const POINT: f32 = 1e-3;
+
+/// A point of a curve with all that a cross-section needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Station {
+    pub center: Vec3,
+    /// Unit tangent, from base to tip.
+    pub ahead: Vec3,
+    /// Unit vector across, the zero of angles.
+    pub right: Vec3,
+    /// Radius of the vessel.
+    pub radius: f32,
+}
+
+impl Station {
+    /// Unit vector across, a quarter turn from [`right`](Self::right).
+    pub fn up(&self) -> Vec3 {
+        self.ahead.cross(self.right)
+    }
+}
+
+/// A kept node.
+#[derive(Clone, Copy, Debug)]
+struct Knot {
+    center: Vec3,
+    ahead: Vec3,
+    right: Vec3,
+    /// Length from the base.
+    length: f32,
+    /// Angle by which the curve has turned since the base.
+    turned: f32,
+    /// Place among the trunk's nodes.
+    place: u32,
+}
+
+/// A node's place on the curve and its radius.
+#[derive(Clone, Copy, Debug)]
+struct Mark {
+    /// Length from the base along the chords.
+    chords: f32,
+    /// Length from the base along the curve.
+    length: f32,
+    /// Radius of the segment that ends here.
+    end_radius: f32,
+    /// Radius with which the segment that ends here begins.
+    start_radius: f32,
+}
+
+/// A shift of the curve's beginning that dies away.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Lean {
+    pub shift: Vec3,
+    pub from: f32,
+    pub to: f32,
+}
+
+/// The centre line of a trunk.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Curve {
+    knots: Vec<Knot>,
+    marks: Vec<Mark>,
+    lean: Lean,
+}
+
+impl Curve {
+    /// Makes this the curve of a trunk. `origin` is subtracted from positions.
+    ///
+    /// `is_lateral`: the first node is another trunk's, and has that one's radius.
+    pub fn set(&mut self, tree: &VesselTree, nodes: &[u32], is_lateral: bool, origin: Vec3) {
+        self.lean = Lean::default();
+        self.set_marks(tree, nodes, is_lateral);
+        self.keep_nodes(tree, nodes, origin);
+        self.set_directions();
+        self.set_lengths();
+        for (first, second) in (0..self.knots.len().saturating_sub(1)).map(|first| (first, first + 1)) {
+            let [from, to] = [first, second].map(|knot| self.knots[knot].length);
+            let places = self.knots[first].place as usize..=self.knots[second].place as usize;
+            spread(&mut self.marks[places], from, to);
+        }
+        // A tip that coincides with the knot before it.
+        let beyond = self.knots.last().map_or(0, |knot| knot.place as usize);
+        let length = self.length();
+        self.marks[beyond..].iter_mut().for_each(|mark| mark.length = length);
+    }
+
+    /// Lengths of the nodes along the chords, and radii.
+    fn set_marks(&mut self, tree: &VesselTree, nodes: &[u32], is_lateral: bool) {
+        self.marks.clear();
+        let mut length = 0.0;
+        for (place, &node) in nodes.iter().enumerate() {
+            let radius = tree.radii()[node as usize];
+            let before = place.checked_sub(1).map(|before| nodes[before] as usize);
+            let (mut end_radius, mut start_radius) = (radius, radius);
+            if let Some(before) = before {
+                length += tree.positions()[node as usize].distance(tree.positions()[before]);
+                // A trunk through a root runs against the tree's order up to the root.
+                let runs_back = tree.parents()[before] == node;
+                let thin = if runs_back { tree.radii()[before] } else { radius };
+                let wide = if runs_back { radius } else { tree.radii()[before] };
+                let flared = wide.min(MAX_FLARE * thin);
+                (start_radius, end_radius) = if runs_back { (thin, flared) } else { (flared, thin) };
+            }
+            self.marks.push(Mark { chords: length, length: 0.0, end_radius, start_radius });
+        }
+        if is_lateral && let [first, second, ..] = &mut self.marks[..] {
+            first.end_radius = second.start_radius;
+            first.start_radius = second.start_radius;
+        }
+    }
+
+    /// The first node, the last, and those in between that are a radius away from others.
+    fn keep_nodes(&mut self, tree: &VesselTree, nodes: &[u32], origin: Vec3) {
+        let knot = |place: usize| Knot {
+            center: tree.positions()[nodes[place] as usize] - origin,
+            ahead: Vec3::ZERO,
+            right: Vec3::ZERO,
+            length: 0.0,
+            turned: 0.0,
+            place: place as u32,
+        };
+        self.knots.clear();
+        self.knots.push(knot(0));
+        let last = nodes.len() - 1;
+        for place in 1..last {
+            let here = knot(place);
+            let room = SPACING * self.marks[place].end_radius;
+            let distance = |other: &Knot| other.center.distance(here.center);
+            if self.knots.last().is_some_and(|before| distance(before) > room) && distance(&knot(last)) > room {
+                self.knots.push(here);
+            }
+        }
+        let least = POINT * self.marks[last].end_radius;
+        if last > 0 && self.knots[self.knots.len() - 1].center.distance(knot(last).center) > least {
+            self.knots.push(knot(last));
+        }
+    }
+
+    /// Tangents, weighted so that they are those of a circle through three knots; frames by the least rotation.
+    fn set_directions(&mut self) {
+        let count = self.knots.len();
+        let chord = |knots: &[Knot], to: usize| {
+            let vector = knots[to].center - knots[to - 1].center;
+            (unit(vector).unwrap_or(Vec3::Z), vector.length())
+        };
+        let mut before = None;
+        for knot in 0..count {
+            let after = (knot + 1 < count).then(|| chord(&self.knots, knot + 1));
+            self.knots[knot].ahead = match (before, after) {
+                (Some((a, length_a)), Some((b, length_b))) => {
+                    let weighted: Vec3 = a * length_b + b * length_a;
+                    unit(weighted).filter(|ahead| ahead.dot(a) > 0.1).unwrap_or(a)
+                }
+                (Some((direction, _)), None) | (None, Some((direction, _))) => direction,
+                (None, None) => Vec3::Z,
+            };
+            before = after;
+        }
+        let first = self.knots[0].ahead.any_orthonormal_vector();
+        self.set_frames(first);
+    }
+
+    /// Sets the frames from that of the base.
+    fn set_frames(&mut self, first: Vec3) {
+        let mut right = across(first, self.knots[0].ahead);
+        let mut ahead = self.knots[0].ahead;
+        for knot in &mut self.knots {
+            right = across(turn(ahead, knot.ahead) * right, knot.ahead);
+            ahead = knot.ahead;
+            knot.right = right;
+        }
+    }
+
+    /// Turns all frames so that angles at a length count from a direction.
+    pub fn set_right(&mut self, length: f32, right: Vec3) {
+        let here = self.at(length);
+        let right = across(right, here.ahead);
+        let (sine, cosine) = (right.dot(here.up()), right.dot(here.right));
+        for knot in &mut self.knots {
+            let up = knot.ahead.cross(knot.right);
+            knot.right = across(knot.right * cosine + up * sine, knot.ahead);
+        }
+    }
+
+    /// Shifts the beginning of the curve.
+    pub fn set_lean(&mut self, lean: Lean) {
+        self.lean = lean;
+    }
+
+    /// Lengths of the curve, and how far it has turned, at the knots.
+    fn set_lengths(&mut self) {
+        let (mut length, mut turned) = (0.0, 0.0);
+        for knot in 1..self.knots.len() {
+            let [a, b] = [self.knots[knot - 1], self.knots[knot]];
+            let chord = a.center.distance(b.center);
+            let middle = hermite(&a, &b, chord, 0.5).0;
+            // Simpson's rule for the two halves' chords: exact to fourth order.
+            let halves = a.center.distance(middle) + middle.distance(b.center);
+            length += halves + (halves - chord) / 3.0;
+            turned += a.ahead.angle_between(unit(b.center - a.center).unwrap_or(a.ahead));
+            turned += b.ahead.angle_between(unit(b.center - a.center).unwrap_or(b.ahead));
+            self.knots[knot].length = length;
+            self.knots[knot].turned = turned;
+        }
+    }
+
+    /// Length of the whole curve.
+    pub fn length(&self) -> f32 {
+        self.knots.last().map_or(0.0, |knot| knot.length)
+    }
+
+    /// Length from the base to a node, by its place in the trunk.
+    pub fn length_of(&self, place: usize) -> f32 {
+        self.marks[place].length
+    }
+
+    /// Place of the node whose segment holds a length.
+    pub fn place_at(&self, length: f32) -> usize {
+        self.marks.partition_point(|mark| mark.length < length).min(self.marks.len() - 1)
+    }
+
+    /// Radius at a length; beyond the ends, that at the end.
+    pub fn radius_at(&self, length: f32) -> f32 {
+        let place = self.place_at(length);
+        let mark = self.marks[place];
+        let Some(before) = place.checked_sub(1).map(|before| self.marks[before]) else { return mark.end_radius };
+        let span = mark.length - before.length;
+        if !(span > 0.0) {
+            return mark.end_radius;
+        }
+        let share = ((length - before.length) / span).clamp(0.0, 1.0);
+        mark.start_radius + share * (mark.end_radius - mark.start_radius)
+    }
+
+    /// How far the curve has turned from the base to a length, in radians.
+    pub fn turned_at(&self, length: f32) -> f32 {
+        let Some((first, second)) = self.span(length) else { return 0.0 };
+        let [a, b] = [first, second].map(|knot| self.knots[knot]);
+        let share = ((length - a.length) / (b.length - a.length)).clamp(0.0, 1.0);
+        a.turned + share * (b.turned - a.turned)
+    }
+
+    /// The knots on both sides of a length, `None` for a curve without length.
+    fn span(&self, length: f32) -> Option<(usize, usize)> {
+        let count = self.knots.len();
+        let second = self.knots.partition_point(|knot| knot.length < length).clamp(1, count.max(2) - 1);
+        (count > 1).then_some((second - 1, second))
+    }
+
+    /// The station at a length; beyond the ends the curve goes straight on.
+    pub fn at(&self, length: f32) -> Station {
+        let radius = self.radius_at(length);
+        let mut station = match self.span(length) {
+            None => {
+                let only = self.knots[0];
+                Station {
+                    center: only.center + only.ahead * (length - only.length),
+                    ahead: only.ahead,
+                    right: only.right,
+                    radius,
+                }
+            }
+            Some((first, second)) => self.between(&self.knots[first], &self.knots[second], length, radius),
+        };
+        let Lean { shift, from, to } = self.lean;
+        if length < to {
+            let share = ((to - length) / (to - from)).clamp(0.0, 1.0);
+            station.center += shift * (share * share * (3.0 - 2.0 * share));
+        }
+        station
+    }
+
+    fn between(&self, a: &Knot, b: &Knot, length: f32, radius: f32) -> Station {
+        if length <= a.length {
+            return Station {
+                center: a.center + a.ahead * (length - a.length),
+                ahead: a.ahead,
+                right: a.right,
+                radius,
+            };
+        }
+        if length >= b.length {
+            return Station {
+                center: b.center + b.ahead * (length - b.length),
+                ahead: b.ahead,
+                right: b.right,
+                radius,
+            };
+        }
+        let share = (length - a.length) / (b.length - a.length);
+        let chord = a.center.distance(b.center);
+        let (center, velocity) = hermite(a, b, chord, share);
+        let ahead = unit(velocity).unwrap_or(a.ahead);
+        let right = across(turn(a.ahead, ahead) * a.right, ahead);
+        Station { center, ahead, right, radius }
+    }
+}
+
+/// Lengths of marks between two knots, in proportion to those along the chords.
+fn spread(marks: &mut [Mark], from: f32, to: f32) {
+    let [first, .., last] = marks else { return };
+    let (start, span) = (first.chords, last.chords - first.chords);
+    let count = marks.len() - 1;
+    for (number, mark) in marks.iter_mut().enumerate() {
+        let share = if span > 0.0 { (mark.chords - start) / span } else { number as f32 / count as f32 };
+        mark.length = from + share * (to - from);
+    }
+}
+
+/// Position and velocity on the spline between two knots.
+fn hermite(a: &Knot, b: &Knot, chord: f32, share: f32) -> (Vec3, Vec3) {
+    let (t, t2, t3) = (share, share * share, share * share * share);
+    let [va, vb] = [a.ahead * chord, b.ahead * chord];
+    let center = a.center * (2.0 * t3 - 3.0 * t2 + 1.0)
+        + va * (t3 - 2.0 * t2 + t)
+        + b.center * (3.0 * t2 - 2.0 * t3)
+        + vb * (t3 - t2);
+    let velocity =
+        (b.center - a.center) * (6.0 * t - 6.0 * t2) + va * (3.0 * t2 - 4.0 * t + 1.0) + vb * (3.0 * t2 - 2.0 * t);
+    (center, velocity)
+}
+
+/// The least rotation from one unit vector to another.
+pub(super) fn turn(from: Vec3, to: Vec3) -> Quat {
+    Quat::from_rotation_arc(from.normalize(), to.normalize())
+}
+
+/// The part of a vector across a unit vector, at unit length; any such vector if there is none.
+pub(super) fn across(vector: Vec3, ahead: Vec3) -> Vec3 {
+    let flat = vector - ahead * ahead.dot(vector);
+    if flat.length_squared() > 1e-8 * vector.length_squared() { unit(flat) } else { None }
+        .unwrap_or_else(|| ahead.any_orthonormal_vector())
+}

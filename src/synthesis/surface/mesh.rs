@@ -1,0 +1,172 @@
+//! The mesh of a surface: what is drawn, bent and written to files.
+
+use super::half_edges::HalfEdges;
+use super::trunks::unit;
+use crate::synthesis::mesh::Closure;
+use crate::synthesis::pace::Pace;
+use bevy_math::{Vec2, Vec3, Vec4};
+
+/// A closed mesh around a vessel tree.
+///
+/// All arrays of vertices have the same length. A vertex where the texture begins and ends is stored once for each of
+/// its texture coordinates: the first [`unique`](Self::unique) vertices have places of their own, and the others are
+/// copies, which share place, normal, node and radius with their [`original`](Self::original).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SurfaceMesh {
+    /// Positions, in tissue lengths.
+    pub positions: Vec<Vec3>,
+    /// Unit normals, outwards.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents in the direction of rising u, with the sign of the bitangent as fourth value, as in glTF.
+    pub tangents: Vec<Vec4>,
+    /// Texture coordinates: u around the vessel, from minus to plus half its circumference, and v along it from its
+    /// base, both in tissue lengths. So a texture that repeats has the same size from trunk to twig.
+    pub uvs: Vec<Vec2>,
+    /// Radius of the vessel at each vertex, in tissue lengths.
+    pub radii: Vec<f32>,
+    /// Node of the tree whose segment each vertex belongs to.
+    pub nodes: Vec<u32>,
+    /// Faces, anticlockwise seen from outside. A triangle repeats its last vertex.
+    pub faces: Vec<[u32; 4]>,
+    /// The original of every copied vertex; the copies are the last vertices.
+    pub copies: Vec<u32>,
+}
+
+impl SurfaceMesh {
+    /// Number of vertices with places of their own.
+    pub fn unique(&self) -> usize {
+        self.positions.len() - self.copies.len()
+    }
+
+    /// The vertex of which another one is a copy, or that vertex itself.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    pub fn original(&self, vertex: u32) -> u32 {
+        (vertex as usize).checked_sub(self.unique()).map_or(vertex, |copy| self.copies[copy])
+    }
+
+    /// Number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.faces.iter().map(|[_, _, c, d]| if c == d { 1 } else { 2 }).sum()
+    }
+
+    /// The faces as triangles; a face with four vertices is divided along its shorter diagonal.
+    pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.faces.iter().flat_map(|&[a, b, c, d]| {
+            let [pa, pb, pc, pd] = [a, b, c, d].map(|vertex| self.positions[vertex as usize]);
+            let (first, second) = if c == d {
+                ([a, b, c], None)
+            } else if pa.distance_squared(pc) <= pb.distance_squared(pd) {
+                ([a, b, c], Some([a, c, d]))
+            } else {
+                ([a, b, d], Some([b, c, d]))
+            };
+            std::iter::once(first).chain(second)
+        })
+    }
+
+    /// The triangles, with originals in place of copies: the closed surface.
+    pub fn closed_triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        self.triangles().map(|corners| corners.map(|corner| self.original(corner)))
+    }
+
+    /// How the surface closes: 2 for each tree as Euler characteristic, and no open edge.
+    pub fn closure(&self) -> Closure {
+        Closure::of(&self.positions, &self.closed_triangles().collect::<Vec<_>>())
+    }
+}
+
+/// The mesh of half-edges, with vertices at these positions.
+pub(super) async fn assemble(
+    half_edges: HalfEdges,
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    pace: &Pace,
+) -> SurfaceMesh {
+    pace.rest(0.0).await;
+    const NONE: u32 = u32::MAX;
+    let unique = positions.len();
+    let mut mesh = SurfaceMesh { positions, normals, ..SurfaceMesh::default() };
+    // Copies of a vertex are a chain from the vertex on.
+    let mut next = vec![NONE; unique];
+    mesh.uvs = vec![Vec2::NAN; unique];
+    let mut faces = Vec::with_capacity(half_edges.len() / 4);
+    for face in half_edges.faces() {
+        let mut corners = [0; 5];
+        let count = face.len();
+        for (slot, half_edge) in face.enumerate() {
+            let (vertex, uv) = (half_edges.origins[half_edge], half_edges.uvs[half_edge]);
+            corners[slot] = mesh.vertex_with(vertex, uv, &mut next);
+        }
+        match corners {
+            [a, b, c, d, _] if count == 4 => faces.push([a, b, c, d]),
+            [a, b, c, d, e] if count == 5 => faces.extend([[a, b, c, d], [a, d, e, e]]),
+            [a, b, c, ..] => faces.push([a, b, c, c]),
+        }
+    }
+    mesh.faces = faces;
+    mesh.radii = half_edges.vertices.radii;
+    mesh.nodes = half_edges.vertices.nodes;
+    for &original in &mesh.copies {
+        let original = original as usize;
+        mesh.positions.push(mesh.positions[original]);
+        mesh.normals.push(mesh.normals[original]);
+        mesh.radii.push(mesh.radii[original]);
+        mesh.nodes.push(mesh.nodes[original]);
+    }
+    mesh.set_tangents();
+    mesh
+}
+
+impl SurfaceMesh {
+    /// The vertex itself if it has these coordinates or none yet, or a copy that has them.
+    fn vertex_with(&mut self, vertex: u32, uv: Vec2, next: &mut Vec<u32>) -> u32 {
+        const NONE: u32 = u32::MAX;
+        if self.uvs[vertex as usize].is_nan() {
+            self.uvs[vertex as usize] = uv;
+            return vertex;
+        }
+        let mut here = vertex;
+        loop {
+            if self.uvs[here as usize] == uv {
+                return here;
+            }
+            if next[here as usize] == NONE {
+                break;
+            }
+            here = next[here as usize];
+        }
+        let copy = self.uvs.len() as u32;
+        next[here as usize] = copy;
+        next.push(NONE);
+        self.uvs.push(uv);
+        self.copies.push(vertex);
+        copy
+    }
+
+    /// Tangents: the direction of rising u on the faces around each vertex, across its normal.
+    fn set_tangents(&mut self) {
+        let mut sums = vec![Vec3::ZERO; self.positions.len()];
+        for &[a, b, c, d] in &self.faces {
+            let [pa, pb, pc, pd] = [a, b, c, d].map(|vertex| self.positions[vertex as usize]);
+            let [ua, ub, uc, ud] = [a, b, c, d].map(|vertex| self.uvs[vertex as usize]);
+            let (across, along) = ((pb + pc) - (pa + pd), (pc + pd) - (pa + pb));
+            let (du, dv) = ((ub + uc) - (ua + ud), (uc + ud) - (ua + ub));
+            // The solution of across = du.x·T + du.y·B and along = dv.x·T + dv.y·B for T, times the determinant.
+            let determinant = du.x * dv.y - du.y * dv.x;
+            let tangent = (across * dv.y - along * du.y) * determinant.signum();
+            for vertex in [a, b, c, d] {
+                sums[vertex as usize] += tangent;
+            }
+        }
+        self.tangents = sums
+            .iter()
+            .zip(&self.normals)
+            .map(|(&sum, &normal)| {
+                let flat = sum - normal * normal.dot(sum);
+                unit(flat).unwrap_or_else(|| normal.any_orthonormal_vector()).extend(1.0)
+            })
+            .collect();
+    }
+}

@@ -1,0 +1,179 @@
+//! Trunks: a tree as tubes that branches leave.
+//!
+//! In: a tree. Out: runs of nodes. A run follows the widest child at each node, unless that turns back by more than a
+//! right angle (the backward connection of Skjermo & Eidheim 2005, section 3): then all children leave the trunk's end
+//! as laterals. The nodes of a root with several children lie in one trunk, from tip to tip.
+
+use crate::synthesis::tree::{NO_PARENT, VesselTree, sweep::Children};
+use bevy_math::Vec3;
+
+const NONE: u32 = u32::MAX;
+
+/// Where a trunk begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Base {
+    /// At a root of the tree, which it closes with an end of its own.
+    Root,
+    /// At a node of another trunk: the trunk's first node is that one's node.
+    Joint {
+        /// The other trunk, which comes before this one.
+        trunk: u32,
+        /// The place of the joint among the other trunk's nodes.
+        at: u32,
+    },
+}
+
+/// All trunks of a tree, each after the one that it leaves.
+#[derive(Debug)]
+pub(super) struct Trunks {
+    nodes: Vec<u32>,
+    starts: Vec<u32>,
+    bases: Vec<Base>,
+    lateral_starts: Vec<u32>,
+    laterals: Vec<u32>,
+}
+
+impl Trunks {
+    /// The trunks of a tree.
+    pub fn of(tree: &VesselTree) -> Self {
+        let courses = Courses::of(tree);
+        let mut trunks = Self {
+            nodes: Vec::with_capacity(tree.len()),
+            starts: vec![0],
+            bases: Vec::new(),
+            lateral_starts: Vec::new(),
+            laterals: Vec::new(),
+        };
+        // For every node, its trunk and its place in it.
+        let mut places = vec![(0, 0); tree.len()];
+        for (node, &parent) in tree.parents().iter().enumerate() {
+            if parent != NO_PARENT
+                && (courses.next[parent as usize] == node as u32 || courses.back[parent as usize] == node as u32)
+            {
+                continue;
+            }
+            let (trunk, start) = (trunks.bases.len() as u32, trunks.nodes.len());
+            if parent == NO_PARENT {
+                trunks.bases.push(Base::Root);
+                trunks.nodes.extend(courses.along(courses.back[node]));
+                trunks.nodes[start..].reverse();
+            } else {
+                let (trunk, at) = places[parent as usize];
+                trunks.bases.push(Base::Joint { trunk, at });
+                trunks.nodes.push(parent);
+            }
+            let own = start + usize::from(parent != NO_PARENT);
+            trunks.nodes.extend(courses.along(node as u32));
+            for (at, &node) in (start..).zip(&trunks.nodes[start..]).skip(own - start) {
+                places[node as usize] = (trunk, (at - start) as u32);
+            }
+            trunks.starts.push(trunks.nodes.len() as u32);
+        }
+        trunks.list_laterals();
+        trunks
+    }
+
+    /// Number of trunks.
+    pub fn len(&self) -> usize {
+        self.bases.len()
+    }
+
+    /// The nodes of a trunk, from its base to its tip.
+    pub fn nodes(&self, trunk: usize) -> &[u32] {
+        &self.nodes[self.starts[trunk] as usize..self.starts[trunk + 1] as usize]
+    }
+
+    /// Where a trunk begins.
+    pub fn base(&self, trunk: usize) -> Base {
+        self.bases[trunk]
+    }
+
+    /// The trunks that leave a trunk, in the order of their joints along it.
+    pub fn laterals(&self, trunk: usize) -> &[u32] {
+        &self.laterals[self.lateral_starts[trunk] as usize..self.lateral_starts[trunk + 1] as usize]
+    }
+
+    fn list_laterals(&mut self) {
+        let mut sorted: Vec<(u32, u32, u32)> = (0u32..)
+            .zip(&self.bases)
+            .filter_map(|(lateral, base)| match *base {
+                Base::Root => None,
+                Base::Joint { trunk, at } => Some((trunk, at, lateral)),
+            })
+            .collect();
+        sorted.sort_unstable();
+        self.lateral_starts = vec![0; self.len() + 1];
+        for (trunk, ..) in &sorted {
+            self.lateral_starts[*trunk as usize + 1] += 1;
+        }
+        for trunk in 0..self.len() {
+            self.lateral_starts[trunk + 1] += self.lateral_starts[trunk];
+        }
+        self.laterals = sorted.into_iter().map(|(.., lateral)| lateral).collect();
+    }
+}
+
+/// With which child a trunk goes on at each node.
+struct Courses {
+    next: Vec<u32>,
+    /// For a root in the middle of a trunk, the child on its other side.
+    back: Vec<u32>,
+}
+
+impl Courses {
+    fn of(tree: &VesselTree) -> Self {
+        let children = tree.children();
+        let directions = directions(tree);
+        let (mut next, mut back) = (vec![NONE; tree.len()], vec![NONE; tree.len()]);
+        for node in 0..tree.len() {
+            let is_root = tree.parents()[node] == NO_PARENT;
+            let ahead = if is_root { Vec3::ZERO } else { directions[node] };
+            next[node] = widest(tree, &children, node, |child| ahead.dot(directions[child]) >= 0.0);
+            if is_root && next[node] != NONE {
+                let first = directions[next[node] as usize];
+                back[node] = widest(tree, &children, node, |child| {
+                    child as u32 != next[node] && first.dot(directions[child]) < 0.0
+                });
+            }
+        }
+        Self { next, back }
+    }
+
+    /// The nodes of a course from one on.
+    fn along(&self, from: u32) -> impl Iterator<Item = u32> + '_ {
+        let mut node = from;
+        std::iter::from_fn(move || {
+            let here = node;
+            (here != NONE).then(|| {
+                node = self.next[here as usize];
+                here
+            })
+        })
+    }
+}
+
+/// The widest child that may follow a node, the first of equals.
+fn widest(tree: &VesselTree, children: &Children, node: usize, may: impl Fn(usize) -> bool) -> u32 {
+    let mut widest = NONE;
+    for &child in children.of(node) {
+        if may(child as usize) && (widest == NONE || tree.radii()[child as usize] > tree.radii()[widest as usize]) {
+            widest = child;
+        }
+    }
+    widest
+}
+
+/// Unit direction of every segment. One without length has that of its parent; zero if that has none either.
+fn directions(tree: &VesselTree) -> Vec<Vec3> {
+    let mut directions = vec![Vec3::ZERO; tree.len()];
+    tree.fold_to_tips(&mut directions, |node, parent, own| {
+        *own = unit(tree.segment_vector(node)).unwrap_or(*parent);
+    });
+    directions
+}
+
+/// The direction of a vector, also of one whose squared length is too small or too large for f32.
+pub(super) fn unit(vector: Vec3) -> Option<Vec3> {
+    let size = vector.abs().max_element();
+    (size > 0.0 && size.is_finite()).then(|| (vector / size).normalize())
+}
