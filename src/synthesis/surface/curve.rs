@@ -10,6 +10,10 @@ use bevy_math::{Quat, Vec3};
 
 /// Distance between kept nodes, in radii.
 const SPACING: f32 = 1.0;
+/// Angle that counts as much as a bulge of a radius.
+const WIDENING: f32 = 4.0;
+/// Distance of knots up to which bulges count, in radii.
+const NEAR: f32 = 6.0;
 /// Segments shorter than this share of the radius have no direction of their own.
 const POINT: f32 = 1e-3;
 
@@ -40,7 +44,7 @@ struct Knot {
     right: Vec3,
     /// Length from the base.
     length: f32,
-    /// Angle by which the curve has turned since the base.
+    /// Angle by which the curve has turned since the base, with bulges of its radius.
     turned: f32,
     /// Place among the trunk's nodes.
     place: u32,
@@ -211,9 +215,21 @@ impl Curve {
             length += halves + (halves - chord) / 3.0;
             turned += a.ahead.angle_between(unit(b.center - a.center).unwrap_or(a.ahead));
             turned += b.ahead.angle_between(unit(b.center - a.center).unwrap_or(b.ahead));
+            turned += WIDENING * self.unevenness(knot, a.center.distance(b.center));
             self.knots[knot].length = length;
             self.knots[knot].turned = turned;
         }
+    }
+
+    /// How far the radius at a knot is from the mean of its neighbours', as a share. Only knots near each other count:
+    /// farther apart, a radius that changes along a segment is a cone as the segment is.
+    fn unevenness(&self, knot: usize, chord: f32) -> f32 {
+        let radius = |knot: usize| self.marks[self.knots[knot].place as usize].end_radius;
+        let here = radius(knot);
+        if knot + 1 == self.knots.len() || chord > NEAR * here {
+            return 0.0;
+        }
+        (here - 0.5 * (radius(knot - 1) + radius(knot + 1))).abs() / here
     }
 
     /// Length of the whole curve.
@@ -244,7 +260,7 @@ impl Curve {
         mark.start_radius + share * (mark.end_radius - mark.start_radius)
     }
 
-    /// How far the curve has turned from the base to a length, in radians.
+    /// How far the curve has turned from the base to a length, in radians, with bulges of its radius.
     pub fn turned_at(&self, length: f32) -> f32 {
         let Some((first, second)) = self.span(length) else { return 0.0 };
         let [a, b] = [first, second].map(|knot| self.knots[knot]);

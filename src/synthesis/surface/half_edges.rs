@@ -13,9 +13,11 @@ use super::cage::{Cage, Vertices};
 use super::trunks::unit;
 use crate::synthesis::pace::Pace;
 use bevy_math::{Vec2, Vec3, ops};
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::TAU;
 
 const NONE: u32 = u32::MAX;
+/// More edges than any vertex of a cage has.
+const MOST_EDGES: usize = 32;
 
 /// The order of half-edges around faces.
 #[derive(Clone, Debug)]
@@ -211,26 +213,34 @@ impl HalfEdges {
     }
 
     fn limit(&self, vertex: usize, masks: &Masks) -> (Vec3, Vec3) {
+        let at = |half_edge: u32| self.vertices.positions[self.origins[half_edge as usize] as usize];
         let here = self.vertices.positions[vertex];
-        let valence = self.around(vertex).count();
-        let weights = masks.of(valence);
-        let (mut ends, mut diagonals) = (Vec3::ZERO, Vec3::ZERO);
+        let first = self.leaving[vertex];
+        // The ends of the edges and the far corners of the faces around the vertex.
+        let mut ring = [[Vec3::ZERO; 2]; MOST_EDGES];
+        let (mut half_edge, mut valence) = (first, 0);
+        let mut sums = [Vec3::ZERO; 2];
+        while valence < MOST_EDGES {
+            let [after, far, before] = [1, 2, 3].map(|step| (half_edge & !3) | ((half_edge + step) & 3));
+            let neighbours = [at(after) - here, at(far) - here];
+            ring[valence] = neighbours;
+            sums = [sums[0] + neighbours[0], sums[1] + neighbours[1]];
+            valence += 1;
+            half_edge = self.twins[before as usize];
+            if half_edge == first {
+                break;
+            }
+        }
         let mut tangents = [Vec3::ZERO; 2];
-        for (place, half_edge) in self.around(vertex).enumerate() {
-            let after = self.faces.next(half_edge);
-            let end = self.vertices.positions[self.origins[after as usize] as usize] - here;
-            let diagonal = self.vertices.positions[self.origins[self.faces.next(after) as usize] as usize] - here;
-            ends += end;
-            diagonals += diagonal;
-            let [along, aside] = weights.at(place);
+        for (neighbours, weights) in ring[..valence].iter().zip(masks.of(valence)) {
             for side in 0..2 {
-                tangents[side] += end * along[side] + diagonal * aside[side];
+                tangents[side] += neighbours[0] * weights[0][side] + neighbours[1] * weights[1][side];
             }
         }
         let n = valence as f32;
-        let position = here + (4.0 * ends + diagonals) / (n * (n + 5.0));
-        let normal = unit(tangents[0].cross(tangents[1])).unwrap_or_else(|| self.mean_normal(vertex));
-        (position, normal)
+        let position = here + (4.0 * sums[0] + sums[1]) / (n * (n + 5.0));
+        let normal = tangents[0].cross(tangents[1]).try_normalize();
+        (position, normal.unwrap_or_else(|| self.mean_normal(vertex)))
     }
 
     /// Normals of the faces around each vertex, weighted by area: for a cage without subdivision.
@@ -293,38 +303,30 @@ fn pair(origins: &[u32], next: &[u32], vertices: usize) -> (Vec<u32>, Vec<u32>) 
     (twins, leaving)
 }
 
-/// Weights of the limit tangents by valence.
+/// Weights of the limit tangents, by valence: for each place around a vertex, those of the edge's end and of the face's
+/// far corner, for two tangents.
 struct Masks {
-    by_valence: Vec<Mask>,
-}
-
-/// For each place around a vertex, the weights of the edge's end and of the face's far corner, for two tangents.
-struct Mask(Vec<[[f32; 2]; 2]>);
-
-impl Mask {
-    fn new(valence: usize) -> Self {
-        let step = TAU / valence as f32;
-        let weight = 1.0 + ops::cos(step) + ops::cos(PI / valence as f32) * (2.0 * (9.0 + ops::cos(step))).sqrt();
-        let angle = |place: usize| place as f32 * step;
-        let mask = (0..valence).map(|place| {
-            let (here, after) = (ops::sin_cos(angle(place)), ops::sin_cos(angle(place + 1)));
-            // Half-edges around a vertex are met anticlockwise.
-            [[weight * here.1, weight * here.0], [here.1 + after.1, here.0 + after.0]]
-        });
-        Self(mask.collect())
-    }
-
-    fn at(&self, place: usize) -> [[f32; 2]; 2] {
-        self.0[place]
-    }
+    by_valence: Vec<Vec<[[f32; 2]; 2]>>,
 }
 
 impl Masks {
     fn new() -> Self {
-        Self { by_valence: (0..32).map(|valence: usize| Mask::new(valence.max(1))).collect() }
+        Self { by_valence: (0..=MOST_EDGES).map(mask).collect() }
     }
 
-    fn of(&self, valence: usize) -> &Mask {
-        &self.by_valence[valence.min(self.by_valence.len() - 1)]
+    fn of(&self, valence: usize) -> &[[[f32; 2]; 2]] {
+        &self.by_valence[valence]
     }
+}
+
+fn mask(valence: usize) -> Vec<[[f32; 2]; 2]> {
+    let step = TAU / valence.max(1) as f32;
+    let weight = 1.0 + ops::cos(step) + ops::cos(0.5 * step) * (2.0 * (9.0 + ops::cos(step))).sqrt();
+    let angle = |place: usize| place as f32 * step;
+    let weights = |place: usize| {
+        // Half-edges around a vertex are met anticlockwise.
+        let ((sine, cosine), (next_sine, next_cosine)) = (ops::sin_cos(angle(place)), ops::sin_cos(angle(place + 1)));
+        [[weight * cosine, weight * sine], [cosine + next_cosine, sine + next_sine]]
+    };
+    (0..valence).map(weights).collect()
 }

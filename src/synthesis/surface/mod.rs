@@ -30,6 +30,7 @@ mod build;
 mod builder;
 mod cage;
 mod caps;
+mod check;
 mod columns;
 mod curve;
 mod exit;
@@ -43,6 +44,7 @@ mod shape;
 mod trunks;
 
 pub use build::Surface;
+pub use check::SurfaceCheck;
 pub use mesh::SurfaceMesh;
 pub use report::SurfaceReport;
 pub use settings::{SurfaceError, SurfaceSettings, TipCap};
