@@ -12,6 +12,8 @@ use bevy_math::{Quat, Vec3};
 const SPACING: f32 = 1.0;
 /// Angle that counts as much as a bulge of a radius.
 const WIDENING: f32 = 4.0;
+/// Length at both ends of a long segment over which the curve turns, in radii.
+const EASE: f32 = 5.0;
 /// Distance of knots up to which bulges count, in radii.
 const NEAR: f32 = 6.0;
 /// Segments shorter than this share of the radius have no direction of their own.
@@ -46,8 +48,10 @@ struct Knot {
     length: f32,
     /// Angle by which the curve has turned since the base, with bulges of its radius.
     turned: f32,
-    /// Place among the trunk's nodes.
+    /// Place among the trunk's nodes; for a point on a segment, that of the node before it.
     place: u32,
+    /// Whether it is a point on a segment.
+    is_between: bool,
 }
 
 /// A node's place on the curve and its radius.
@@ -76,6 +80,7 @@ pub(super) struct Lean {
 pub(super) struct Curve {
     knots: Vec<Knot>,
     marks: Vec<Mark>,
+    eased: Vec<Knot>,
     lean: Lean,
 }
 
@@ -87,12 +92,16 @@ impl Curve {
         self.lean = Lean::default();
         self.set_marks(tree, nodes, is_lateral);
         self.keep_nodes(tree, nodes, origin);
+        self.ease_long_segments();
         self.set_directions();
         self.set_lengths();
-        for (first, second) in (0..self.knots.len().saturating_sub(1)).map(|first| (first, first + 1)) {
-            let [from, to] = [first, second].map(|knot| self.knots[knot].length);
-            let places = self.knots[first].place as usize..=self.knots[second].place as usize;
-            spread(&mut self.marks[places], from, to);
+        let mut before: Option<Knot> = None;
+        for knot in self.knots.iter().filter(|knot| !knot.is_between) {
+            if let Some(before) = before {
+                let places = before.place as usize..=knot.place as usize;
+                spread(&mut self.marks[places], before.length, knot.length);
+            }
+            before = Some(*knot);
         }
         // A tip that coincides with the knot before it.
         let beyond = self.knots.last().map_or(0, |knot| knot.place as usize);
@@ -134,6 +143,7 @@ impl Curve {
             length: 0.0,
             turned: 0.0,
             place: place as u32,
+            is_between: false,
         };
         self.knots.clear();
         self.knots.push(knot(0));
@@ -150,6 +160,25 @@ impl Curve {
         if last > 0 && self.knots[self.knots.len() - 1].center.distance(knot(last).center) > least {
             self.knots.push(knot(last));
         }
+    }
+
+    /// Keeps long segments straight but near their ends: a spline from node to node would bow out of them.
+    fn ease_long_segments(&mut self) {
+        self.eased.clear();
+        for pair in self.knots.windows(2) {
+            let [a, b] = [pair[0], pair[1]];
+            let chord = b.center - a.center;
+            let reach = EASE * self.marks[b.place as usize].end_radius;
+            let length = chord.length();
+            self.eased.push(a);
+            if length > 3.0 * reach {
+                let share = reach / length;
+                let between = |share: f32| Knot { center: a.center + chord * share, is_between: true, ..a };
+                self.eased.extend([between(share), between(1.0 - share)]);
+            }
+        }
+        self.eased.extend(self.knots.last());
+        std::mem::swap(&mut self.knots, &mut self.eased);
     }
 
     /// Tangents, weighted so that they are those of a circle through three knots; frames by the least rotation.
