@@ -20,7 +20,8 @@ fn grow(seed: u64) -> [VesselTree; 2] {
     let preset = presets[(seed as usize / cases.len()) % presets.len()].load();
     let generator = preset.generator_for(case.tissue.extent());
     let settings = generator.colonization().expect("presets colonize").clone();
-    let settings = ColonizationSettings { steps: settings.steps.min(30), samples: settings.samples.min(300), ..settings };
+    let settings =
+        ColonizationSettings { steps: settings.steps.min(30), samples: settings.samples.min(300), ..settings };
     let mut growth = Colonization::new(case.tissue.clone(), settings, &case.roots, seed).expect("a growth");
     growth.run();
     [VesselKind::Artery, VesselKind::Vein].map(|kind| (*growth.tree(kind)).clone())

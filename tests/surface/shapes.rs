@@ -123,7 +123,12 @@ fn hard_trees() -> Vec<(&'static str, VesselTree)> {
         (Vec3::Z * 10.0, 1, 1.0),
         (Vec3::new(5.0, 0.0, 5.0), 1, 1e-4),
     ]);
-    let wide_child = tree(&[(Vec3::ZERO, NO_PARENT, 0.05), (Vec3::Z, 0, 0.05), (Vec3::Z * 2.0, 1, 0.6), (Vec3::new(1.0, 0.0, 1.0), 1, 0.5)]);
+    let wide_child = tree(&[
+        (Vec3::ZERO, NO_PARENT, 0.05),
+        (Vec3::Z, 0, 0.05),
+        (Vec3::Z * 2.0, 1, 0.6),
+        (Vec3::new(1.0, 0.0, 1.0), 1, 0.5),
+    ]);
     vec![
         ("one node", tree(&[(Vec3::ONE, NO_PARENT, 0.5)])),
         ("chain", tube(0.1, 5.0, 100)),
@@ -151,7 +156,9 @@ fn hard_trees() -> Vec<(&'static str, VesselTree)> {
 #[test]
 fn hard_trees_have_closed_surfaces_at_all_settings() {
     for (name, tree) in hard_trees() {
-        for (most_sides, least_sides, level) in [(16, 4, 1), (4, 4, 1), (4, 4, 0), (16, 4, 0), (64, 8, 1), (8, 8, 2), (16, 16, 3)] {
+        for (most_sides, least_sides, level) in
+            [(16, 4, 1), (4, 4, 1), (4, 4, 0), (16, 4, 0), (64, 8, 1), (8, 8, 2), (16, 16, 3)]
+        {
             for tips in [TipCap::Round, TipCap::Pointed] {
                 let settings = SurfaceSettings { level, most_sides, least_sides, tips };
                 sound_surface(&format!("{name}, {settings:?}"), &tree, &settings);
@@ -165,10 +172,12 @@ fn hard_trees_have_closed_surfaces_at_all_settings() {
 
 #[test]
 fn trees_with_room_have_no_faces_that_meet() {
-    let with_room = ["chain", "balanced", "comb", "zigzag 45°", "helix", "star of 3", "forest", "backward", "uneven", "far away"];
+    let with_room =
+        ["chain", "balanced", "comb", "zigzag 45°", "helix", "star of 3", "forest", "backward", "uneven", "far away"];
     for (name, tree) in hard_trees().into_iter().filter(|(name, _)| with_room.contains(name)) {
         for level in [1, 2] {
-            let check = sound_surface(name, &tree, &SurfaceSettings { level, ..SurfaceSettings::default() }).mesh.validate();
+            let check =
+                sound_surface(name, &tree, &SurfaceSettings { level, ..SurfaceSettings::default() }).mesh.validate();
             assert!(check.is_sound(), "{name}, level {level}: {:?}", check.vessels);
         }
     }
@@ -178,7 +187,8 @@ fn trees_with_room_have_no_faces_that_meet() {
 fn volumes_are_those_of_the_round_cones() {
     let names = ["chain", "balanced", "star of 3", "comb", "zigzag 45°", "helix", "forest", "backward"];
     for (name, tree) in hard_trees().into_iter().filter(|(name, _)| names.contains(name)) {
-        let union = union_volume(&tree, 200_000) + if name == "forest" { f64::from(4.0 / 3.0 * PI * 0.027) } else { 0.0 };
+        let union =
+            union_volume(&tree, 200_000) + if name == "forest" { f64::from(4.0 / 3.0 * PI * 0.027) } else { 0.0 };
         let ratio = volume(&Surface::new(&tree, &SurfaceSettings::default()).expect(name).mesh) / union;
         assert!((ratio - 1.0).abs() < 0.05, "{name}: {ratio}");
     }
@@ -206,7 +216,11 @@ fn a_tube_is_as_wide_as_its_vessel_and_ends_in_half_balls() {
 #[test]
 fn textures_have_one_size_and_tangents_follow_them() {
     let mesh = sound_surface("tube", &tube(0.5, 12.0, 6), &SurfaceSettings::default()).mesh;
-    for &face in mesh.faces.iter().filter(|face| face.iter().all(|&corner| (2.0..10.0).contains(&mesh.positions[corner as usize].z))) {
+    for &face in mesh
+        .faces
+        .iter()
+        .filter(|face| face.iter().all(|&corner| (2.0..10.0).contains(&mesh.positions[corner as usize].z)))
+    {
         let [a, b, _, d] = face.map(|corner| (mesh.positions[corner as usize], mesh.uvs[corner as usize]));
         for (from, to) in [(a, b), (a, d)] {
             let (length, shown) = (from.0.distance(to.0), from.1.distance(to.1));
@@ -247,7 +261,12 @@ fn an_empty_tree_has_an_empty_surface() {
 
 #[test]
 fn a_vessel_within_another_is_reported() {
-    let tree = tree(&[(Vec3::ZERO, NO_PARENT, 1.0), (Vec3::Z * 4.0, 0, 1.0), (Vec3::Z * 8.0, 1, 1.0), (Vec3::new(0.5, 0.0, 4.5), 1, 0.1)]);
+    let tree = tree(&[
+        (Vec3::ZERO, NO_PARENT, 1.0),
+        (Vec3::Z * 4.0, 0, 1.0),
+        (Vec3::Z * 8.0, 1, 1.0),
+        (Vec3::new(0.5, 0.0, 4.5), 1, 0.1),
+    ]);
     let surface = sound_surface("stub", &tree, &SurfaceSettings::default());
     assert_eq!(surface.report.absorbed.iter().map(|node| node.0).collect::<Vec<_>>(), [3]);
     assert!(surface.mesh.nodes.iter().all(|&node| node != 3));

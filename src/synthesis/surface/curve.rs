@@ -297,6 +297,24 @@ impl Curve {
         a.turned + share * (b.turned - a.turned)
     }
 
+    /// The length after another one by an effort, which counts length and turn at two rates.
+    pub fn after(&self, length: f32, effort: f32, rates: [f32; 2]) -> f32 {
+        let Some((_, mut next)) = self.span(length) else { return length + effort / rates[0] };
+        let (mut at, mut turned, mut left) = (length, self.turned_at(length), effort);
+        loop {
+            let knot = &self.knots[next];
+            let needed = (knot.length - at) * rates[0] + (knot.turned - turned) * rates[1];
+            if needed >= left && needed > 0.0 {
+                return at + (knot.length - at) * (left / needed);
+            }
+            if next + 1 == self.knots.len() {
+                return knot.length.max(at) + (left - needed.max(0.0)) / rates[0];
+            }
+            (at, turned, left) = (knot.length.max(at), knot.turned, left - needed.max(0.0));
+            next += 1;
+        }
+    }
+
     /// The knots on both sides of a length, `None` for a curve without length.
     fn span(&self, length: f32) -> Option<(usize, usize)> {
         let count = self.knots.len();

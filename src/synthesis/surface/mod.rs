@@ -29,12 +29,14 @@
 mod build;
 mod builder;
 mod cage;
+mod cage_mesh;
 mod caps;
 mod check;
 mod columns;
 mod curve;
 mod exit;
 mod half_edges;
+mod limit;
 mod mesh;
 mod report;
 mod rings;

@@ -126,7 +126,15 @@ impl Rings {
     fn push(&mut self, curve: &Curve, length: f32, sides: u32, row: Option<u32>) {
         let station = curve.at(length);
         let first_angle = self.angles.len() as u32;
-        self.rings.push(Ring { station, length, sides, normal: station.ahead, radius: station.radius, first_angle, row });
+        self.rings.push(Ring {
+            station,
+            length,
+            sides,
+            normal: station.ahead,
+            radius: station.radius,
+            first_angle,
+            row,
+        });
     }
 
     /// Rings between two lengths, the ends excluded. Sides change by a factor of 2 from ring to ring.
@@ -135,15 +143,12 @@ impl Rings {
         let factors = last.max(sides).ilog2() - last.min(sides).ilog2();
         // Effort of a stretch: the number of belts that its length and its turn need.
         let radius = curve.radius_at(0.5 * (from + to));
-        let effort = |length: f32| {
-            (length - from) / (LONGEST * radius) + (curve.turned_at(length) - curve.turned_at(from)) / MOST_TURN
-        };
-        let belts = effort(to).min(MOST_RINGS).ceil().max(factors as f32).max(1.0) as u32;
-        let turns = curve.turned_at(to) - curve.turned_at(from) > 0.3 * MOST_TURN;
+        let rates = [1.0 / (LONGEST * radius), 1.0 / MOST_TURN];
+        let effort = (to - from) * rates[0] + (curve.turned_at(to) - curve.turned_at(from)) * rates[1];
+        let belts = effort.min(MOST_RINGS).ceil().max(factors as f32).max(1.0) as u32;
         let mut length = from;
         for belt in 1..belts {
-            let wanted = effort(to) * belt as f32 / belts as f32;
-            length = if turns { root(&effort, wanted, [length, to]) } else { from + (to - from) * belt as f32 / belts as f32 };
+            length = curve.after(length, effort / belts as f32, rates).min(to);
             let left = (belts - belt).min(5);
             let least = (last / 2).max(sides >> left);
             let most = (last * 2).min(sides << left);
@@ -259,7 +264,8 @@ impl Rings {
         while row(after).is_some() && last + 1 < self.rings.len() && row(last + 1) == row(after) {
             last += 1;
         }
-        let tilted = |ring: &mut Ring| ring.normal = within_tilt(unit(ring.normal + mean).unwrap_or(mean), ring.station.ahead);
+        let tilted =
+            |ring: &mut Ring| ring.normal = within_tilt(unit(ring.normal + mean).unwrap_or(mean), ring.station.ahead);
         self.rings[first..=before].iter_mut().for_each(tilted);
         self.rings[after..=last].iter_mut().for_each(tilted);
     }
@@ -295,13 +301,4 @@ fn within_tilt(normal: Vec3, ahead: Vec3) -> Vec3 {
     }
     let out = unit(normal - ahead * cosine).unwrap_or(Vec3::ZERO);
     (ahead * MOST_TILT + out * (1.0 - MOST_TILT * MOST_TILT).sqrt()).normalize()
-}
-
-/// Where a rising function has a value, by halving.
-fn root(function: &impl Fn(f32) -> f32, value: f32, [mut low, mut high]: [f32; 2]) -> f32 {
-    for _ in 0..12 {
-        let middle = 0.5 * (low + high);
-        if function(middle) < value { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
 }

@@ -60,9 +60,17 @@ fn swell(sides: u32, level: u32) -> f32 {
     let parts = 1 << if level == 0 { SurfaceSettings::MOST_LEVEL } else { level };
     let point = |part: u32| {
         let t = part as f32 / parts as f32;
-        let weights = [(1.0 - t).powi(3), 3.0 * t.powi(3) - 6.0 * t * t + 4.0, 1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t.powi(3), t.powi(3)];
+        let weights = [
+            (1.0 - t).powi(3),
+            3.0 * t.powi(3) - 6.0 * t * t + 4.0,
+            1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t.powi(3),
+            t.powi(3),
+        ];
         let sum = |coordinate: fn(f32) -> f32| {
-            let terms = weights.iter().enumerate().map(|(place, weight)| weight / 6.0 * coordinate((place as f32 - 1.0) * step));
+            let terms = weights
+                .iter()
+                .enumerate()
+                .map(|(place, weight)| weight / 6.0 * coordinate((place as f32 - 1.0) * step));
             terms.sum::<f32>()
         };
         Vec2::new(sum(ops::cos), sum(ops::sin))
