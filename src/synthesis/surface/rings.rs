@@ -14,7 +14,7 @@ use bevy_math::Vec3;
 /// The longest distance between rings, in radii.
 const LONGEST: f32 = 12.0;
 /// The most by which the curve turns between two rings, in radians.
-const MOST_TURN: f32 = 0.45;
+const MOST_TURN: f32 = 0.35;
 /// The most rings between two rows; a vessel of a thousand radii without a branch has fewer.
 const MOST_RINGS: f32 = 100_000.0;
 /// Cosine of the most by which a plane is tilted against its curve.
@@ -113,6 +113,10 @@ impl Rings {
 
     fn end(&mut self, curve: &Curve, before: f32, columns: &Columns, shape: &Shape) {
         let radius = curve.radius_at(curve.length());
+        // A root without a segment is a ball: both ends on one ring.
+        if self.rings.len() == 1 && self.rings[0].length == 0.0 && curve.length() < LEAST_APART * radius {
+            return;
+        }
         let tip = curve.length().max(before + 0.3 * radius);
         let sides = shape.sides_of(radius);
         let even = columns.evened(sides);
