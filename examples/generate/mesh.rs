@@ -111,7 +111,10 @@ impl MeshFigures {
 /// The report on a surface as named numbers. A new field of the report is a new line here.
 fn ladder(report: &SurfaceReport) -> Vec<(&'static str, usize)> {
     vec![
-        ("laterals", report.laterals), //
+        ("laterals", report.laterals),
+        ("joined", report.joined),
+        ("shortened", report.shortened),
+        ("moved", report.moved),
         ("absorbed", report.absorbed.len()),
     ]
 }

@@ -52,7 +52,7 @@ impl Surface {
             for _ in 1..settings.level {
                 half_edges = half_edges.refined_paced(&pace.part(0.4..0.6)).await;
             }
-            finish(&half_edges, origin, &pace.part(0.6..1.0)).await
+            finish(half_edges, origin, &pace.part(0.6..1.0)).await
         };
         Ok(Self { mesh, report })
     }

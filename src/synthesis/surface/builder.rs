@@ -8,14 +8,15 @@
 use super::cage::Cage;
 use super::caps;
 use super::columns::Columns;
-use super::curve::{Curve, Lean, across};
+use super::curve::{Curve, Lean};
+use super::direction::{across, unit};
 use super::exit::Exit;
 use super::report::SurfaceReport;
 use super::rings::{Ring, Rings, Start};
 use super::rows::{Opening, Row, rows};
 use super::settings::TipCap;
 use super::shape::Shape;
-use super::trunks::{Base, Trunks, unit};
+use super::trunks::{Base, Trunks};
 use crate::synthesis::pace::{Pace, SHORT_STRETCH};
 use crate::synthesis::tree::{NodeId, VesselTree};
 use bevy_math::{Vec3, ops};
@@ -108,6 +109,12 @@ impl<'a> Builder<'a> {
         let curve = &self.curves[trunk];
         let from = start.length + if edge.is_some() { 0.3 * curve.radius_at(start.length) } else { 0.0 };
         let mut rows = rows(curve, &self.exits, self.shape, from, curve.length());
+        for row in &rows {
+            let count = row.openings.len();
+            self.report.joined += if count > 1 { count } else { 0 };
+            self.report.shortened += if row.is_shortened() { count } else { 0 };
+            self.report.moved += if row.is_moved() { count } else { 0 };
+        }
         self.rings.lay(curve, &start, &mut rows, self.shape);
         self.add_rings(trunk);
         self.add_belts(&rows);

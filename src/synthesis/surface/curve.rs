@@ -4,9 +4,9 @@
 //! out: vessels that grow while branches leave them zigzag within their own width. Between the nodes that stay, the
 //! curve is a cubic Hermite spline with unit speed at the nodes; the radius is that of the round cones.
 
-use super::trunks::unit;
+use super::direction::{across, turn, unit};
 use crate::synthesis::{segment_index::MAX_FLARE, tree::VesselTree};
-use bevy_math::{Quat, Vec3};
+use bevy_math::Vec3;
 
 /// Distance between kept nodes, in radii.
 const SPACING: f32 = 1.0;
@@ -393,16 +393,4 @@ fn hermite(a: &Knot, b: &Knot, chord: f32, share: f32) -> (Vec3, Vec3) {
     let velocity =
         (b.center - a.center) * (6.0 * t - 6.0 * t2) + va * (3.0 * t2 - 4.0 * t + 1.0) + vb * (3.0 * t2 - 2.0 * t);
     (center, velocity)
-}
-
-/// The least rotation from one unit vector to another.
-pub(super) fn turn(from: Vec3, to: Vec3) -> Quat {
-    Quat::from_rotation_arc(from.normalize(), to.normalize())
-}
-
-/// The part of a vector across a unit vector, at unit length; any such vector if there is none.
-pub(super) fn across(vector: Vec3, ahead: Vec3) -> Vec3 {
-    let flat = vector - ahead * ahead.dot(vector);
-    if flat.length_squared() > 1e-8 * vector.length_squared() { unit(flat) } else { None }
-        .unwrap_or_else(|| ahead.any_orthonormal_vector())
 }

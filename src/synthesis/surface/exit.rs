@@ -4,8 +4,8 @@
 //! the trunk, over a length of r / sin θ to both sides, and is clear of it (R + r·|cos θ|) / sin θ from the trunk's centre
 //! line, measured along the lateral: the room of Skjermo & Eidheim 2005, equation 4.
 
-use super::curve::{Curve, Station, across};
-use super::trunks::unit;
+use super::curve::{Curve, Station};
+use super::direction::{across, unit};
 use bevy_math::{Vec3, ops};
 
 /// The least sine of the angle between trunk and lateral that counts: 20°. Flatter ones leave by a slanted stub.

@@ -9,7 +9,7 @@
 //! refinement rule for parallel Catmull–Clark subdivision" (2021).
 
 use super::cage::{Cage, Vertices};
-use super::trunks::unit;
+use super::direction::unit;
 use crate::synthesis::pace::Pace;
 use bevy_math::{Vec2, Vec3};
 

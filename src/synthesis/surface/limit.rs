@@ -6,9 +6,10 @@
 //! Source of the limit masks: Halstead, Kass & `DeRose`, "Efficient, fair interpolation using Catmull–Clark surfaces"
 //! (1993).
 
+use super::cage::Vertices;
+use super::direction::unit;
 use super::half_edges::{HalfEdges, Split};
 use super::mesh::SurfaceMesh;
-use super::trunks::unit;
 use crate::synthesis::pace::Pace;
 use bevy_math::{Vec2, Vec3, ops};
 use std::f32::consts::TAU;
@@ -17,34 +18,46 @@ use std::f32::consts::TAU;
 const MOST_EDGES: usize = 32;
 const NONE: u32 = u32::MAX;
 
-/// Makes the mesh of the next subdivision.
-pub(super) async fn finish(half_edges: &HalfEdges, origin: Vec3, pace: &Pace) -> SurfaceMesh {
-    let split = half_edges.split_paced(&pace.part(0.0..0.4)).await;
-    let limits = Limits { half_edges, split: &split, masks: Masks::new() };
+/// Makes the mesh of the next subdivision. What is no longer needed is dropped on the way, so that a large mesh needs
+/// hardly more memory than it takes itself.
+pub(super) async fn finish(mut half_edges: HalfEdges, origin: Vec3, pace: &Pace) -> SurfaceMesh {
+    let mut split = half_edges.split_paced(&pace.part(0.0..0.4)).await;
+    let mut mesh = SurfaceMesh::default();
+    (mesh.positions, mesh.normals) = limits(&half_edges, &split, origin, &pace.part(0.4..0.7)).await;
+    split.vertices.positions = Vec::new();
+    let charts = Charts::of(&half_edges, &split, &pace.part(0.7..0.8)).await;
+    (half_edges.uvs, half_edges.vertices) = (Vec::new(), Vertices::default());
+    mesh.faces.reserve_exact(half_edges.len());
+    let quad = |half_edge: usize| mesh.faces.push(charts.quad(&half_edges, &split, half_edge as u32));
+    pace.part(0.8..0.9).each(half_edges.len(), quad).await;
+    let vertices = split.vertices;
+    drop((half_edges, split.face_of));
+    (mesh.uvs, mesh.copies) = (charts.uvs, charts.copies);
+    (mesh.radii, mesh.nodes) = (vertices.radii, vertices.nodes);
+    mesh.complete(&pace.part(0.9..1.0)).await;
+    mesh
+}
+
+/// Positions and normals of all vertices, in their order.
+async fn limits(half_edges: &HalfEdges, split: &Split, origin: Vec3, pace: &Pace) -> (Vec<Vec3>, Vec<Vec3>) {
+    let limits = Limits { half_edges, split, masks: Masks::new() };
     let count = split.vertices.positions.len();
     let (mut positions, mut normals) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let mut push = |(position, normal): (Vec3, Vec3)| {
         positions.push(origin + position);
         normals.push(normal);
     };
-    let faces = half_edges.face_count();
-    pace.part(0.4..0.5).each(split.first_face as usize, |vertex| push(limits.of_vertex(vertex))).await;
-    pace.part(0.5..0.6).each(faces, |face| push(limits.of_face(face))).await;
+    let old = split.first_face as usize;
+    pace.part(0.0..0.3).each(old, |vertex| push(limits.of_vertex(vertex))).await;
+    pace.part(0.3..0.6).each(half_edges.face_count(), |face| push(limits.of_face(face))).await;
     let edge = |half_edge: usize| {
         let half_edge = half_edge as u32;
         if half_edges.twin(half_edge) > half_edge {
             push(limits.of_edge(half_edge));
         }
     };
-    pace.part(0.6..0.7).each(half_edges.len(), edge).await;
-    let mut mesh = SurfaceMesh { positions, normals, ..SurfaceMesh::default() };
-    let charts = Charts::of(half_edges, &split, &pace.part(0.7..0.8)).await;
-    let quad = |half_edge: usize| mesh.faces.push(charts.quad(half_edges, &split, half_edge as u32));
-    pace.part(0.8..0.9).each(half_edges.len(), quad).await;
-    (mesh.uvs, mesh.copies) = (charts.uvs, charts.copies);
-    (mesh.radii, mesh.nodes) = (split.vertices.radii, split.vertices.nodes);
-    mesh.complete(&pace.part(0.9..1.0)).await;
-    mesh
+    pace.part(0.6..1.0).each(half_edges.len(), edge).await;
+    (positions, normals)
 }
 
 /// Limits of the vertices of a subdivision.
@@ -186,7 +199,7 @@ struct Charts {
 
 impl Charts {
     async fn of(mesh: &HalfEdges, split: &Split, pace: &Pace) -> Self {
-        let unique = split.vertices.positions.len();
+        let unique = split.vertices.radii.len();
         let mut charts = Self {
             uvs: Vec::with_capacity(unique + unique / 4),
             copies: Vec::new(),

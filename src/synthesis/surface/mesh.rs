@@ -1,6 +1,6 @@
 //! The mesh of a surface: what is drawn, bent and written to files.
 
-use super::trunks::unit;
+use super::direction::unit;
 use crate::synthesis::mesh::Closure;
 use crate::synthesis::pace::Pace;
 use bevy_math::{Vec2, Vec3, Vec4};
@@ -79,6 +79,11 @@ impl SurfaceMesh {
 impl SurfaceMesh {
     /// Adds what follows from the rest: all but the texture coordinates of copies, and tangents.
     pub(super) async fn complete(&mut self, pace: &Pace) {
+        let count = self.copies.len();
+        self.positions.reserve_exact(count);
+        self.normals.reserve_exact(count);
+        self.radii.reserve_exact(count);
+        self.nodes.reserve_exact(count);
         for &original in &self.copies {
             let original = original as usize;
             self.positions.push(self.positions[original]);
@@ -92,7 +97,7 @@ impl SurfaceMesh {
 
     /// Tangents: the direction of rising u on the faces around each vertex, across its normal.
     async fn set_tangents(&mut self, pace: &Pace) {
-        let mut sums = vec![Vec3::ZERO; self.positions.len()];
+        let mut tangents = vec![Vec4::W; self.positions.len()];
         let add = |face: usize| {
             let [a, b, c, d] = self.faces[face];
             let [pa, pb, pc, pd] = [a, b, c, d].map(|vertex| self.positions[vertex as usize]);
@@ -103,17 +108,17 @@ impl SurfaceMesh {
             let determinant = du.x * dv.y - du.y * dv.x;
             let tangent = (across * dv.y - along * du.y) * determinant.signum();
             for vertex in [a, b, c, d] {
-                sums[vertex as usize] += tangent;
+                tangents[vertex as usize] += tangent.extend(0.0);
             }
         };
         pace.part(0.2..0.7).each(self.faces.len(), add).await;
-        self.tangents = sums
-            .iter()
-            .zip(&self.normals)
-            .map(|(&sum, &normal)| {
+        pace.part(0.7..1.0)
+            .each(tangents.len(), |vertex| {
+                let (sum, normal) = (tangents[vertex].truncate(), self.normals[vertex]);
                 let flat = sum - normal * normal.dot(sum);
-                unit(flat).unwrap_or_else(|| normal.any_orthonormal_vector()).extend(1.0)
+                tangents[vertex] = unit(flat).unwrap_or_else(|| normal.any_orthonormal_vector()).extend(1.0);
             })
-            .collect();
+            .await;
+        self.tangents = tangents;
     }
 }

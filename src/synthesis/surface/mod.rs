@@ -34,6 +34,7 @@ mod caps;
 mod check;
 mod columns;
 mod curve;
+mod direction;
 mod exit;
 mod half_edges;
 mod limit;

@@ -6,9 +6,9 @@
 
 use super::columns::Columns;
 use super::curve::{Curve, Station};
+use super::direction::unit;
 use super::rows::Row;
 use super::shape::Shape;
-use super::trunks::unit;
 use bevy_math::Vec3;
 
 /// The longest distance between rings, in radii.

@@ -55,6 +55,22 @@ pub(super) struct Row {
     pub radius: f32,
     /// Its openings, in the order of their angles.
     pub openings: Vec<Opening>,
+    /// Half the length that its openings need.
+    needed: f32,
+    /// Length at which its openings would best lie.
+    wish: f32,
+}
+
+impl Row {
+    /// Whether it was made shorter than its openings need.
+    pub fn is_shortened(&self) -> bool {
+        self.half < 0.99 * self.needed
+    }
+
+    /// Whether it lies beside its place, by more than half its length.
+    pub fn is_moved(&self) -> bool {
+        (self.length - self.wish).abs() > self.half
+    }
 }
 
 /// All rows of a trunk, from one length to another if there is room.
@@ -73,6 +89,9 @@ pub(super) fn rows(curve: &Curve, exits: &[Exit], shape: &Shape, from: f32, to: 
                 rows.push(row);
             }
         }
+    }
+    for row in &mut rows {
+        (row.needed, row.wish) = (row.half, row.length);
     }
     place(&mut rows, from, to);
     rows
@@ -143,14 +162,13 @@ impl Row {
 ///
 /// Rows that would be moved far are made shorter first, since an opening far from its lateral is worse than a narrow one.
 fn place(rows: &mut [Row], from: f32, to: f32) {
-    let wishes: Vec<f32> = rows.iter().map(|row| row.length).collect();
     for round in 0..ROUNDS {
-        let pools = pooled(rows, &wishes, from, to);
+        let pools = pooled(rows, from, to);
         let mut first = 0;
         let mut is_crowded = false;
         for count in pools {
             let pool = first..first + count;
-            let is_far = |index: usize| (rows[index].length - wishes[index]).abs() > FAR * rows[index].half;
+            let is_far = |index: usize| (rows[index].length - rows[index].wish).abs() > FAR * rows[index].half;
             if count > 1 && pool.clone().any(is_far) {
                 is_crowded = true;
                 if round + 1 < ROUNDS {
@@ -169,7 +187,7 @@ fn place(rows: &mut [Row], from: f32, to: f32) {
 ///
 /// Without the bounds that is an isotonic regression: rows that would overlap are pooled, each pool at the mean of its
 /// rows' wishes. If all rows together are longer than the room, all are made shorter.
-fn pooled(rows: &mut [Row], wishes: &[f32], from: f32, to: f32) -> Vec<usize> {
+fn pooled(rows: &mut [Row], from: f32, to: f32) -> Vec<usize> {
     let gap = |a: &Row, b: &Row| GAP * a.half.min(b.half);
     let halves: f32 = rows.iter().map(|row| 2.0 * row.half).sum();
     let needed = halves + rows.windows(2).map(|pair| gap(&pair[0], &pair[1])).sum::<f32>();
@@ -187,7 +205,7 @@ fn pooled(rows: &mut [Row], wishes: &[f32], from: f32, to: f32) -> Vec<usize> {
             closest += a.half + b.half + gap(a, b);
         }
         places.push(closest);
-        let mut pool = (wishes[index] - closest, rows[index].radius, 1);
+        let mut pool = (rows[index].wish - closest, rows[index].radius, 1);
         while let Some(&(wish, weight, count)) = pools.last()
             && wish > pool.0
         {

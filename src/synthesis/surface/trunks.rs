@@ -4,6 +4,7 @@
 //! right angle (the backward connection of Skjermo & Eidheim 2005, section 3): then all children leave the trunk's end
 //! as laterals. An only child is always followed. The nodes of a root with several children lie in one trunk, from tip to tip.
 
+use super::direction::unit;
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree, sweep::Children};
 use bevy_math::Vec3;
 
@@ -194,10 +195,4 @@ fn leaving(tree: &VesselTree, children: &Children, child: usize) -> Vec3 {
         }
     }
     unit(tree.positions()[to] - from).unwrap_or(Vec3::ZERO)
-}
-
-/// The direction of a vector, also of one whose squared length is too small or too large for f32.
-pub(super) fn unit(vector: Vec3) -> Option<Vec3> {
-    let size = vector.abs().max_element();
-    (size > 0.0 && size.is_finite()).then(|| (vector / size).normalize())
 }
