@@ -158,3 +158,46 @@ fn a_large_surface_follows_within_a_frame() {
     println!("{} vertices of {} nodes: {:.2} ms for 100 000", mesh.positions.len(), tree.len(), 1000.0 * each);
     assert!(each < 0.05, "{each} s for 100 000 vertices");
 }
+
+/// What is drawn from afar has fewer faces, and the size of the finest surface.
+#[test]
+fn surfaces_for_distant_views_are_smaller_and_as_wide() {
+    for tree in [grown(80), tee()] {
+        let settings = SurfaceSettings::default();
+        let fine = Surface::new(&tree, &settings).expect("a surface").mesh;
+        let coarse = Surface::coarse(&tree, &settings).expect("a surface").mesh;
+        let sketch = Surface::sketch(&tree).mesh;
+        let counts = [&fine, &coarse, &sketch].map(SurfaceMesh::triangle_count);
+        println!("{} nodes: {counts:?} triangles", tree.len());
+        assert!(3 * counts[1] < counts[0] && 3 * counts[2] < counts[1], "{counts:?}");
+        assert!(coarse.closure().is_closed());
+        for mesh in [&coarse, &sketch] {
+            assert_eq!(mesh.normals.len(), mesh.positions.len());
+            let volume = volume(mesh) / volume(&fine);
+            assert!((0.75..1.25).contains(&volume), "{volume} of the volume");
+            let facing = |[a, b, c]: [u32; 3]| {
+                let [pa, pb, pc] = [a, b, c].map(|vertex| mesh.positions[vertex as usize]);
+                (pb - pa)
+                    .cross(pc - pa)
+                    .dot(mesh.normals[a as usize] + mesh.normals[b as usize] + mesh.normals[c as usize])
+            };
+            let outwards = mesh.triangles().filter(|&corners| facing(corners) >= 0.0).count();
+            assert!(outwards * 20 > mesh.triangle_count() * 19, "{outwards} of {}", mesh.triangle_count());
+            let moved = followed(&tree, mesh, |at| at + Vec3::X);
+            assert!(
+                moved.iter().zip(&mesh.positions).all(|(now, before)| now.position.distance(*before + Vec3::X) < 1e-4)
+            );
+        }
+    }
+    let bad = SurfaceSettings { most_sides: 7, ..SurfaceSettings::default() };
+    assert!(Surface::coarse(&tee(), &bad).is_err());
+    assert_eq!(Surface::sketch(&VesselTree::new()).mesh, SurfaceMesh::default());
+}
+
+fn volume(mesh: &SurfaceMesh) -> f32 {
+    let six = mesh.triangles().map(|corners| {
+        let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());
+        a.dot(b.cross(c))
+    });
+    (six.sum::<f64>() / 6.0) as f32
+}

@@ -11,7 +11,7 @@ use crate::{
     plugin::{OrganVessels, SurfaceLevel, VesselAppearance, VesselMesh, VesselSurface, Vessels, VesselsOf},
     synthesis::tree::VesselKind,
 };
-use bevy::{camera::visibility::VisibilityRange, ecs::query::QueryFilter, prelude::*};
+use bevy::{camera::visibility::VisibilityRange, prelude::*};
 
 /// Gives new entities of meshes their material: one for each vessel entity.
 pub(super) fn dress_levels(
@@ -108,24 +108,27 @@ pub(super) fn hide_covered(
     mut chunks: Query<&mut Visibility, With<SegmentChunk>>,
 ) {
     for (segments, _) in &drawn {
-        set_visibility(segments, &mut chunks);
+        let visibility = if segments.is_covered() { Visibility::Hidden } else { Visibility::Inherited };
+        set_visibility(segments, visibility, &mut chunks);
     }
 }
 
 /// Shows the segments of vessels that lost their mesh.
 pub(super) fn uncover(
     removed: On<Remove, VesselMesh>,
-    mut drawn: Query<&mut SegmentBuffer>,
+    drawn: Query<&SegmentBuffer>,
     mut chunks: Query<&mut Visibility, With<SegmentChunk>>,
 ) {
-    if let Ok(mut segments) = drawn.get_mut(removed.entity) {
-        segments.note_cover(false);
-        set_visibility(&segments, &mut chunks);
+    if let Ok(segments) = drawn.get(removed.entity) {
+        set_visibility(segments, Visibility::Inherited, &mut chunks);
     }
 }
 
-fn set_visibility<F: QueryFilter>(segments: &SegmentBuffer, chunks: &mut Query<&mut Visibility, F>) {
-    let visibility = if segments.is_covered() { Visibility::Hidden } else { Visibility::Inherited };
+fn set_visibility(
+    segments: &SegmentBuffer,
+    visibility: Visibility,
+    chunks: &mut Query<&mut Visibility, With<SegmentChunk>>,
+) {
     let mut chunks = chunks.iter_many_mut(segments.chunks().iter().chain(segments.stump_chunks()));
     while let Some(mut chunk) = chunks.fetch_next() {
         chunk.set_if_neq(visibility);

@@ -10,7 +10,7 @@ use crate::plugin::surface::{
 use crate::synthesis::{
     binding::Skin,
     pace::Pace,
-    surface::{Surface, SurfaceSettings},
+    surface::{Surface, SurfaceError, SurfaceSettings},
     tree::{NodeId, VesselTree},
     wound::{Remains, Wounds},
 };
@@ -31,8 +31,10 @@ pub(super) struct Source {
     pub wounds: Option<Wounds>,
     /// Whether the nodes may move.
     pub is_followed: bool,
-    /// Settings of each level, the finest first.
-    pub levels: Vec<SurfaceSettings>,
+    /// Settings of the finest level.
+    pub settings: SurfaceSettings,
+    /// Number of levels.
+    pub levels: usize,
 }
 
 /// The surfaces of a vessel entity.
@@ -85,16 +87,16 @@ impl Built {
 
 /// Makes surfaces, with a Bevy mesh for each.
 pub(super) async fn build(source: Source, pace: Pace) -> Result<(Built, Vec<Mesh>), VesselSurfaceError> {
-    let Source { tree, wounds, is_followed, levels } = source;
+    let Source { tree, wounds, is_followed, settings, levels } = source;
     let remains = match &wounds {
         Some(wounds) => Some(Remains::of_paced(wounds, &tree, REACH, &pace.part(0.0..0.05)).await),
         None => None,
     };
     let left = remains.as_ref().map_or(&tree, |remains| &remains.tree);
-    let mut built = Vec::with_capacity(levels.len());
-    for (level, settings) in levels.iter().enumerate() {
-        let pace = pace.part(share_of(level, levels.len()));
-        let mut surface = Surface::new_paced(left, settings, &pace.part(0.0..0.8)).await?;
+    let mut built = Vec::with_capacity(levels);
+    for level in 0..levels {
+        let pace = pace.part(share_of(level, levels));
+        let mut surface = surface_of(left, &settings, level, &pace.part(0.0..0.8)).await?;
         let skin = match is_followed {
             true => Some(Skin::new_paced(&surface.mesh, left, &pace.part(0.8..0.9)).await?),
             false => None,
@@ -116,6 +118,20 @@ pub(super) async fn build(source: Source, pace: Pace) -> Result<(Built, Vec<Mesh
         pace.rest(1.0).await;
     }
     Ok((Built { tree: Arc::new(tree), remains, levels: built, origin, aabb, room }, meshes))
+}
+
+/// The surface of a tree at a level of detail.
+async fn surface_of(
+    tree: &VesselTree,
+    settings: &SurfaceSettings,
+    level: usize,
+    pace: &Pace,
+) -> Result<Surface, SurfaceError> {
+    match level {
+        0 => Surface::new_paced(tree, settings, pace).await,
+        1 => Surface::coarse_paced(tree, settings, pace).await,
+        _ => Ok(Surface::sketch_paced(tree, pace).await),
+    }
 }
 
 /// The share of all work that a level is: the finest takes most.
@@ -145,21 +161,17 @@ mod tests {
         }
         let tree =
             VesselTree::from_arrays(vec![Vec3::ZERO, Vec3::X], vec![NO_PARENT, 0], vec![0.1; 2]).expect("a tree");
-        let levels = vec![SurfaceSettings::default(); 3];
         let pace = Pace::new(|| false);
-        let source = Source { tree, wounds: None, is_followed: true, levels };
+        let settings = SurfaceSettings::default();
+        let source = Source { tree, wounds: None, is_followed: true, settings, levels: 3 };
         let (built, meshes) = at_once(build(source, pace.clone())).expect("a surface");
         assert_eq!((pace.progress(), built.levels.len(), meshes.len(), built.can_follow()), (1.0, 3, 3, true));
     }
 
     #[test]
     fn an_empty_tree_has_an_empty_surface() {
-        let source = Source {
-            tree: VesselTree::new(),
-            wounds: None,
-            is_followed: true,
-            levels: vec![SurfaceSettings::default()],
-        };
+        let (tree, settings) = (VesselTree::new(), SurfaceSettings::default());
+        let source = Source { tree, wounds: None, is_followed: true, settings, levels: 3 };
         let (built, meshes) = at_once(build(source, Pace::default())).expect("a surface");
         assert_eq!((built.levels[0].surface.mesh.positions.len(), meshes[0].count_vertices()), (0, 0));
     }

@@ -21,7 +21,6 @@ use crate::plugin::{
         wounds::VesselWounds,
     },
 };
-use crate::synthesis::surface::SurfaceSettings;
 use bevy::{
     asset::Assets,
     ecs::{
@@ -161,7 +160,8 @@ impl SurfacedVesselsItem<'_, '_> {
             tree: self.vessels.tree_at_rest().into_owned(),
             wounds: self.wounds.filter(|_| wanted.is_cut()).map(|wounds| wounds.without_history()),
             is_followed: organ.is_followed,
-            levels: levels(organ.surface),
+            settings: organ.surface.settings.clone(),
+            levels: if organ.surface.detail.is_some() { SurfaceDetail::LEVELS } else { 1 },
         };
         let items = ITEMS.saturating_mul(source.tree.len());
         mesh.coming = Some((wanted.clone(), jobs.start(items, |pace| build(source, pace))));
@@ -179,12 +179,6 @@ impl SurfacedVesselsItem<'_, '_> {
             (self.mesh.is_ready, self.mesh.is_shown) = (is_ready, is_shown);
         }
     }
-}
-
-/// Settings of all levels of detail, the finest first.
-fn levels(surface: &VesselSurface) -> Vec<SurfaceSettings> {
-    let count = if surface.detail.is_some() { SurfaceDetail::LEVELS as u32 } else { 1 };
-    (0..count).map(|level| SurfaceDetail::settings(&surface.settings, level)).collect()
 }
 
 /// The outcome of a job as one result.

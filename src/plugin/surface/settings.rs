@@ -70,8 +70,10 @@ pub enum SurfaceShown {
 
 /// The distances at which coarser meshes take over.
 ///
-/// There are three meshes, made of the same tree: each has half as many sides around a vessel as the one before, and one
-/// subdivision less. Around each distance both are drawn in a pattern of pixels, so that nothing pops.
+/// There are three meshes, made of the same tree: the one that was asked for, a closed one without subdivisions
+/// ([`Surface::coarse`](crate::synthesis::surface::Surface::coarse)), and a prism for each branch
+/// ([`Surface::sketch`](crate::synthesis::surface::Surface::sketch)). Around each distance both are drawn in a pattern of
+/// pixels, so that nothing pops.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[reflect(Default, Clone, PartialEq)]
@@ -99,18 +101,6 @@ impl SurfaceDetail {
     pub const DEFAULT_FADE: f32 = 0.25;
     /// Number of meshes.
     pub const LEVELS: usize = 3;
-
-    /// The settings of a level, from those of the finest.
-    pub(crate) fn settings(finest: &SurfaceSettings, level: u32) -> SurfaceSettings {
-        let sides = |sides: u32| if sides > 4 { (sides >> level.min(31)).max(4) } else { sides };
-        SurfaceSettings {
-            // A cage without a subdivision is wider than the vessel.
-            level: finest.level.saturating_sub(level).max(finest.level.min(1)),
-            most_sides: sides(finest.most_sides),
-            least_sides: sides(finest.least_sides),
-            ..finest.clone()
-        }
-    }
 
     /// The range of distances of each level, in sizes: where it begins to appear, is whole, begins to vanish, is gone.
     /// Values outside their limits are clamped.
@@ -148,22 +138,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn coarser_levels_are_valid_wherever_the_finest_is() {
-        for finest in 0..=SurfaceSettings::MOST_LEVEL {
-            for (most, least) in [(64, 4), (64, 64), (4, 4), (8, 8)] {
-                let finest =
-                    SurfaceSettings { level: finest, most_sides: most, least_sides: least, ..Default::default() };
-                for level in 0..SurfaceDetail::LEVELS as u32 {
-                    let settings = SurfaceDetail::settings(&finest, level);
-                    assert_eq!(settings.validate(), Ok(()));
-                    assert!(level > 0 || settings == finest);
-                }
-            }
-        }
-        let odd = SurfaceSettings { most_sides: 7, ..SurfaceSettings::default() };
-        assert!(SurfaceDetail::settings(&odd, 0).validate().is_err(), "an error stays one");
     }
 }
