@@ -57,7 +57,7 @@ pub(super) fn update_segments(
     for mut drawn in &mut drawn {
         // What is not drawn is not kept up to date, colours included.
         let was_covered = drawn.segments.is_covered();
-        drawn.segments.note_cover(drawn.mesh.is_some_and(VesselMesh::is_shown));
+        drawn.segments.bypass_change_detection().note_cover(drawn.mesh.is_some_and(VesselMesh::is_shown));
         if drawn.segments.is_covered() {
             continue;
         }

@@ -77,8 +77,11 @@ fn a_mesh_appears_when_the_vessels_have_grown() {
         app.update();
         thread::sleep(Duration::from_millis(1));
     }
-    run_until_shown(&mut app, organ);
-    let news = drain(app.world(), &mut ready);
+    let mut news = Vec::new();
+    run_until(&mut app, "surfaces", |world| {
+        news.extend(drain(world, &mut ready));
+        is_shown(world, organ)
+    });
     assert!(
         KINDS.iter().all(|&kind| news.iter().filter(|ready| (ready.organ, ready.kind) == (organ, kind)).count() == 1)
     );
@@ -358,21 +361,27 @@ fn what_cannot_be_saved_is_told() {
     let mut failed = MessageCursor::<SurfaceNotSaved>::default();
     let bare = organ_of(&mut app, &[(VesselKind::Artery, &fork(0.2))], ());
     let empty = organ_of(&mut app, &[], plain());
+    let blank = organ_of(&mut app, &[(VesselKind::Artery, &VesselTree::new())], plain());
     let organ = organ_of(&mut app, &[(VesselKind::Artery, &fork(0.2))], plain());
-    for (organ, path) in
-        [(bare, file("a.ply")), (empty, file("b.ply")), (organ, file("c.blend")), (organ, file("no/d.ply"))]
-    {
+    for (organ, path) in [
+        (bare, file("a.ply")),
+        (blank, file("e.ply")),
+        (empty, file("b.ply")),
+        (organ, file("c.blend")),
+        (organ, file("no/d.ply")),
+    ] {
         app.world_mut().commands().entity(organ).save_surface_with(path, SurfaceOptions::default());
     }
     app.world_mut().flush();
     let mut told = Vec::new();
     run_until(&mut app, "answers", |world| {
         told.extend(drain(world, &mut failed));
-        told.len() == 4
+        told.len() == 5
     });
     let errors_of =
         |of: Entity| told.iter().filter(|failed| failed.organ == of).map(|failed| &failed.error).collect::<Vec<_>>();
     assert!(matches!(errors_of(bare)[..], [SurfaceSaveError::NoSurface]));
     assert!(matches!(errors_of(empty)[..], [SurfaceSaveError::NoVessels]));
+    assert!(matches!(errors_of(blank)[..], [SurfaceSaveError::NoVessels]));
     assert!(matches!(errors_of(organ)[..], [SurfaceSaveError::Write(_), SurfaceSaveError::Write(_)]), "{told:?}");
 }

@@ -22,7 +22,7 @@ const REACH: f32 = 1.0;
 /// Room in the box around a surface for the corners of coarser ones, in radii of the widest vessel.
 const ROOM: f32 = 0.1;
 /// Number of items, as jobs count them, that a node is.
-pub(super) const ITEMS: usize = 16;
+pub(super) const ITEMS: usize = 128;
 
 /// What surfaces are made of.
 pub(super) struct Source {

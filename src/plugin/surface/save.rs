@@ -4,6 +4,7 @@
 
 use crate::plugin::{
     announcer::Announcer,
+    growth::progress::GrowthProgress,
     job::{Job, Jobs},
     surface::{
         messages::{SurfaceAction, SurfaceCommand, SurfaceNotSaved, SurfaceSaveError, SurfaceSaved},
@@ -64,6 +65,7 @@ pub(crate) struct SaveNews<'w, 's> {
 pub(crate) struct SavedOrgan {
     vessels: Option<&'static OrganVessels>,
     appearance: Option<&'static VesselAppearance>,
+    progress: Option<&'static GrowthProgress>,
 }
 
 /// Surface: reads commands.
@@ -174,6 +176,9 @@ impl Part {
                 is_complete = false;
                 continue;
             };
+            if vessels.tree().is_empty() && organ.progress.is_none_or(GrowthProgress::is_finished) {
+                continue;
+            }
             match &mesh.built {
                 Some((_, built)) if mesh.is_ready => {
                     let Some(level) = built.levels.first() else { continue };
@@ -182,13 +187,16 @@ impl Part {
                     parts.push(Self { kind, tree: Arc::clone(&built.tree), surface, color });
                 }
                 _ => {
-                    if let Some(error) = mesh.error() {
+                    if let Some(error) = mesh.error().filter(|_| mesh.coming.is_none()) {
                         return Err(error.clone().into());
                     }
                     is_complete = false;
                     mesh.bypass_change_detection().is_wanted = true;
                 }
             }
+        }
+        if is_complete && parts.is_empty() {
+            return Err(SurfaceSaveError::NoVessels);
         }
         parts.sort_by_key(|part| part.kind.index());
         Ok(is_complete.then_some(parts))

@@ -262,9 +262,10 @@ fn first_rotation(matrix: Mat3) -> Quat {
         turn.x_axis.dot(matrix.x_axis) + turn.y_axis.dot(matrix.y_axis) + turn.z_axis.dot(matrix.z_axis)
     };
     // The first of equals, so that straight vessels at rest have no rotation.
-    ends.into_iter()
-        .reduce(|best, end| if agreement(end) > agreement(best) + 1e-4 { end } else { best })
-        .unwrap_or_default()
+    let better = |best: Quat, end: Quat| if agreement(end) > agreement(best) + 1e-4 { end } else { best };
+    let best = ends.into_iter().reduce(better).unwrap_or_default();
+    // A start that is almost a turn by two right angles away leaves it slowly.
+    rotation(matrix, best, FIRST_STEPS)
 }
 
 /// The rotation nearest to a matrix, from a start.
