@@ -86,13 +86,15 @@ fn give_up(mut failures: MessageReader<GrowthFailed>, mut exit: MessageWriter<Ap
 /// Spreads the steps over the frames that the user asked for; the rest is then done at once.
 fn grow(
     args: Res<StudioArgs>,
-    time: Res<Time<Real>>,
+    (time, shots): (Res<Time<Real>>, Res<Shots>),
     organs: Query<(Entity, &GrowthProgress)>,
     mut session: ResMut<Session>,
     mut budget: ResMut<GrowthBudget>,
     mut commands: MessageWriter<GrowthCommand>,
 ) {
     if organs.is_empty() {
+        // Pictures are requested together with the organs that grow for them, or nothing grows.
+        session.grown = !shots.0.is_empty();
         return;
     }
     let steps: u32 = organs.iter().map(|(_, progress)| progress.steps).sum();

@@ -2,6 +2,7 @@
 
 mod batch;
 mod edit;
+mod mesh;
 mod organ;
 mod report;
 
@@ -12,6 +13,7 @@ use bevy_vessels::synthesis::{
     io::{MeshReadError, load_mesh},
     preset::{Preset, PresetName},
     roots::RootPlacement,
+    surface::SurfaceSettings,
     tissue::{MeshTissue, SourceData, Tissue, TissueMode, TissueShape, TissueSource},
 };
 use clap::{Parser, ValueEnum};
@@ -71,7 +73,16 @@ pub struct Options {
     /// Formats to write.
     #[arg(long, value_delimiter = ',', default_value = "swc")]
     pub format: Vec<Format>,
-    /// Prints one line of JSON per organ.
+    /// Makes the closed meshes for their figures, even if none is written. Files of meshes make them anyway.
+    #[arg(long)]
+    pub mesh: bool,
+    /// Subdivisions of the closed meshes, 0 to 4. Each makes four times as many faces.
+    #[arg(long, default_value_t = SurfaceSettings::DEFAULT_LEVEL, value_name = "N")]
+    pub mesh_level: u32,
+    /// Sides of the closed meshes around the widest vessels, before subdivision: 4, 8, 16, 32 or 64.
+    #[arg(long, default_value_t = SurfaceSettings::DEFAULT_MOST_SIDES, value_name = "N")]
+    pub mesh_sides: u32,
+    /// Prints one line of JSON per organ, with the figures of its closed meshes if these are made.
     #[arg(long)]
     pub json: bool,
 }
@@ -119,10 +130,20 @@ impl Mode {
 pub enum Format {
     /// Nodes and radii, a file for each kind of vessels.
     Swc,
-    /// A surface to look at.
+    /// A surface to look at: round cones that overlap.
     Obj,
     /// A table of segments.
     Csv,
+    /// Closed meshes, as binary glTF.
+    Glb,
+    /// Closed meshes, as binary STL.
+    Stl,
+    /// Closed meshes of triangles, as binary PLY, with the measures of the vessels.
+    Ply,
+    /// Closed meshes, as OFF.
+    Off,
+    /// Closed meshes, as OBJ.
+    ObjMesh,
 }
 
 /// Why the command stopped.
@@ -164,6 +185,10 @@ struct Job {
     preset_name: String,
     out: Option<PathBuf>,
     formats: Vec<Format>,
+    /// How closed meshes are made, if any are wanted.
+    surface: Option<SurfaceSettings>,
+    /// Whether they are measured.
+    mesh_figures: bool,
 }
 
 /// Grows the requested organs, and reports on `stdout` and in files.
@@ -199,6 +224,7 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
     if !(options.lengths.is_finite() && options.lengths > 0.0) {
         return Err(Failure::Usage(format!("--lengths is {}; it must be finite and above 0", options.lengths)));
     }
+    let surface = surface_settings(options)?;
     let tissue = build_tissue(options, &mut preset)?;
     let generator = preset.generator_for(tissue.extent()).scaled(options.lengths);
     for warning in generator.validate().map_err(Failure::usage)? {
@@ -211,8 +237,27 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
     let mut formats = options.format.clone();
     formats.sort();
     formats.dedup();
-    let tissue_name = options.tissue.display().to_string();
-    Ok(Job { tissue, generator, preset, tissue_name, preset_name, out: options.out.clone(), formats })
+    Ok(Job {
+        tissue,
+        generator,
+        preset,
+        tissue_name: options.tissue.display().to_string(),
+        preset_name,
+        out: options.out.clone(),
+        formats,
+        surface,
+        mesh_figures: options.mesh || options.json,
+    })
+}
+
+/// Settings of the closed meshes, checked even if none is wanted.
+fn surface_settings(options: &Options) -> Result<Option<SurfaceSettings>, Failure> {
+    let (level, most_sides) = (options.mesh_level, options.mesh_sides);
+    let settings = SurfaceSettings { level, most_sides, ..SurfaceSettings::default() };
+    let given = format!("--mesh-level {level}, --mesh-sides {most_sides}");
+    settings.validate().map_err(|error| Failure::Usage(format!("{given}: {error}")))?;
+    let is_written = options.format.iter().any(|format| format.mesh_ending().is_some());
+    Ok((options.mesh || is_written).then_some(settings))
 }
 
 /// The settings that an option changes.

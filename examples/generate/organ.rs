@@ -1,13 +1,15 @@
 //! One organ: grown, measured, written.
 
+use super::mesh::{Meshed, meshes, save};
 use super::report::{KindMeasures, Line};
 use super::{Failure, Format, Job};
 use bevy_vessels::synthesis::{
     growth::{Growth, StepCount},
     io::{ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc, swc_structure},
     roots::Roots,
-    tree::{VesselKind, VesselTree, hash_trees},
+    tree::{ByKind, VesselKind, VesselTree, hash_trees},
 };
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -27,13 +29,13 @@ impl<'a> Grower<'a> {
 
     /// Grows the organ of a seed, calling `after_step` after each step, and writes its files.
     pub fn grow(&mut self, seed: u64, mut after_step: impl FnMut(StepCount)) -> Result<Line, Failure> {
-        let named = |error| Failure::Run(format!("{} with seed {seed}: {error}", self.job.tissue_name));
+        let named = |error: &dyn Display| Failure::Run(format!("{} with seed {seed}: {error}", self.job.tissue_name));
         let (generator, tissue) = (&self.job.generator, Arc::clone(&self.job.tissue));
         let growth = match self.growth.take() {
             Some(growth) => generator.restart(growth, tissue, &self.roots, seed),
             None => generator.start(tissue, &self.roots, seed),
         };
-        let growth = self.growth.insert(growth.map_err(named)?).as_mut();
+        let growth = self.growth.insert(growth.map_err(|error| named(&error))?).as_mut();
         let start = Instant::now();
         while !growth.is_finished() {
             growth.advance();
@@ -42,6 +44,8 @@ impl<'a> Grower<'a> {
         growth.settle();
         let grow_ms = 1e3 * start.elapsed().as_secs_f64();
         let hash = hash_trees(growth.trees().values().flatten().map(|grown| grown.tree));
+        let meshes = meshes(self.job, growth).map_err(|error| named(&error))?;
+        let measured = meshes.as_ref().map(|_, mesh| mesh.as_ref().filter(|_| self.job.mesh_figures));
         Ok(Line {
             tissue: self.job.tissue_name.clone(),
             preset: self.job.preset_name.clone(),
@@ -49,14 +53,20 @@ impl<'a> Grower<'a> {
             steps: growth.progress().done,
             grow_ms: (grow_ms * 1e3).round() / 1e3,
             hash: format!("{hash:016x}"),
-            kinds: KindMeasures::of(growth, &*self.job.tissue, seed),
-            files: write_files(self.job, growth, seed, hash)?,
+            kinds: KindMeasures::of(growth, &*self.job.tissue, seed, &measured),
+            files: write_files(self.job, growth, &meshes, seed, hash)?,
         })
     }
 }
 
 /// Writes the vessels as drawn, and returns the files' paths.
-fn write_files(job: &Job, growth: &dyn Growth, seed: u64, hash: u64) -> Result<Vec<String>, Failure> {
+fn write_files(
+    job: &Job,
+    growth: &dyn Growth,
+    meshes: &ByKind<Option<Meshed>>,
+    seed: u64,
+    hash: u64,
+) -> Result<Vec<String>, Failure> {
     let Some(folder) = &job.out else {
         return Ok(Vec::new());
     };
@@ -67,31 +77,39 @@ fn write_files(job: &Job, growth: &dyn Growth, seed: u64, hash: u64) -> Result<V
         .collect();
     let stem = format!("{}_{}_{seed}", file_name(&tissue_stem(job)), file_name(&job.preset_name));
     let mut files = Vec::new();
-    let mut save = |name: String, save: &dyn Fn(&Path) -> Result<(), WriteError>| {
+    let mut write = |name: String, write: &dyn Fn(&Path) -> Result<(), WriteError>| {
         let path = folder.join(name);
         files.push(path.display().to_string());
-        save(&path).map_err(Failure::run)
+        write(&path).map_err(Failure::run)
     };
     for format in &job.formats {
         match format {
             Format::Swc => {
                 for &(kind, tree) in &trees {
                     let options =
-                        SwcOptions { comments: comments(job, kind, seed, hash), structure: swc_structure(kind) };
-                    save(format!("{stem}_{}.swc", kind.name()), &|path| save_swc(path, tree, &options))?;
+                        SwcOptions { comments: comments(job, Some(kind), seed, hash), structure: swc_structure(kind) };
+                    write(format!("{stem}_{}.swc", kind.name()), &|path| save_swc(path, tree, &options))?;
                 }
             }
-            Format::Obj => save(format!("{stem}.obj"), &|path| save_obj(path, &trees, &ObjOptions::default()))?,
-            Format::Csv => save(format!("{stem}.csv"), &|path| save_csv(path, &trees))?,
+            Format::Obj => write(format!("{stem}.obj"), &|path| save_obj(path, &trees, &ObjOptions::default()))?,
+            Format::Csv => write(format!("{stem}.csv"), &|path| save_csv(path, &trees))?,
+            mesh => {
+                if let Some(ending) = mesh.mesh_ending() {
+                    write(format!("{stem}{ending}"), &|path| save(path, meshes, comments(job, None, seed, hash)))?;
+                }
+            }
         }
     }
     Ok(files)
 }
 
 /// Header comments with all that is needed to grow a file's vessels again.
-fn comments(job: &Job, kind: VesselKind, seed: u64, hash: u64) -> Vec<String> {
+///
+/// `kind` is that of the vessels if the file has only one.
+fn comments(job: &Job, kind: Option<VesselKind>, seed: u64, hash: u64) -> Vec<String> {
+    let kind = kind.map_or(String::new(), |kind| format!("{} ", kind.name()));
     vec![
-        format!("{} vessels of {}, preset {}, seed {seed}", kind.name(), job.tissue_name, job.preset_name),
+        format!("{kind}vessels of {}, preset {}, seed {seed}", job.tissue_name, job.preset_name),
         format!("hash of all kinds of vessels: {hash:016x}"),
         "unit: that of the tissue".into(),
     ]

@@ -1,5 +1,6 @@
 //! The report of an organ.
 
+use super::mesh::{MeshFigures, Meshed};
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     growth::{GrownTree, Growth},
@@ -45,8 +46,9 @@ impl Line {
     pub fn text(&self) -> String {
         let Self { tissue, preset, seed, grow_ms, hash, .. } = self;
         let kinds = self.kinds.0.iter().filter_map(|(kind, measures)| {
-            let Measures { nodes, leaves, .. } = measures.as_ref()?;
-            Some(format!("{} {nodes} nodes, {leaves} leaves; ", kind.plural().to_lowercase()))
+            let Measures { nodes, leaves, mesh, .. } = measures.as_ref()?;
+            let mesh = mesh.as_ref().map_or(String::new(), |mesh| format!(", {} triangles", mesh.triangles));
+            Some(format!("{} {nodes} nodes, {leaves} leaves{mesh}; ", kind.plural().to_lowercase()))
         });
         format!("{tissue} {preset} seed {seed}: {}{grow_ms:.1} ms; {hash}", kinds.collect::<String>())
     }
@@ -58,11 +60,16 @@ pub struct KindMeasures(ByKind<Option<Measures>>);
 
 impl KindMeasures {
     /// Measures the vessels of a finished growth.
-    pub fn of(growth: &dyn Growth, tissue: &dyn Tissue, seed: u64) -> Self {
+    ///
+    /// `meshes` are the surfaces to measure.
+    pub fn of(growth: &dyn Growth, tissue: &dyn Tissue, seed: u64, meshes: &ByKind<Option<&Meshed>>) -> Self {
         let mut rng = Stream::Statistics.rng(seed);
         let supplied = tissue.at_step(growth.progress().done);
         let samples: Vec<Vec3> = (0..COVERAGE_SAMPLES).filter_map(|_| supplied.sample(&mut rng)).collect();
-        Self(growth.trees().map(|_, grown| grown.map(|grown| Measures::of(grown, tissue, &samples))))
+        Self(growth.trees().map(|kind, grown| {
+            let mesh = meshes[kind].map(MeshFigures::of);
+            grown.map(|grown| Measures { mesh, ..Measures::of(grown, tissue, &samples) })
+        }))
     }
 }
 
@@ -88,6 +95,8 @@ pub struct Measures {
     tortuosity_median: Option<f64>,
     coverage: Option<f32>,
     outside: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mesh: Option<MeshFigures>,
 }
 
 impl Measures {
@@ -110,6 +119,7 @@ impl Measures {
             tortuosity_median: measured.tortuosity.map(|tortuosity| tortuosity.median),
             coverage: statistics::coverage(tree, samples, reach),
             outside: statistics::outside(tree, |node| tissue.contains(node)),
+            mesh: None,
         }
     }
 }

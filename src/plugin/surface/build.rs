@@ -19,8 +19,8 @@ use std::{ops::Range, sync::Arc};
 
 /// How far the round ends of a surface reach beyond its tips, in radii.
 const REACH: f32 = 1.0;
-/// Room in the box around a surface for the corners of coarser ones, in radii of the widest vessel.
-const ROOM: f32 = 0.1;
+/// Room in the box around a surface for rounding, in radii of the widest vessel.
+const ROOM: f32 = 0.01;
 /// Number of items, as jobs count them, that a node is.
 pub(super) const ITEMS: usize = 128;
 
@@ -108,10 +108,11 @@ pub(super) async fn build(source: Source, pace: Pace) -> Result<(Built, Vec<Mesh
         pace.rest(1.0).await;
     }
     let widest = tree.radii().iter().copied().fold(0.0, f32::max);
-    let finest = built.first().map_or(&[][..], |level| &level.surface.mesh.positions);
-    let origin = Vec3::from(box_around(finest.iter().copied(), Vec3::ZERO, 0.0).center);
+    // One box for all levels, so that each is seen as far to the side as the others.
+    let vertices = || built.iter().flat_map(|level| level.surface.mesh.positions.iter().copied());
+    let origin = Vec3::from(box_around(vertices(), Vec3::ZERO, 0.0).center);
     let room = ROOM * widest;
-    let aabb = box_around(finest.iter().copied(), origin, room);
+    let aabb = box_around(vertices(), origin, room);
     let mut meshes = Vec::with_capacity(built.len());
     for level in &built {
         meshes.push(mesh_around(&level.surface.mesh, origin));

@@ -54,7 +54,7 @@ pub(crate) fn follow_vessels(
     }
 }
 
-/// Moves all levels with the nodes of the present tree. Returns the box around the finest.
+/// Moves all levels with the nodes of the present tree. Returns the box around them.
 fn bend(
     built: &mut Built,
     tree: &VesselTree,
@@ -63,7 +63,7 @@ fn bend(
     meshes: &mut Assets<Mesh>,
 ) -> Option<Aabb> {
     let (nodes, origin) = (built.nodes(tree, scratch).to_vec(), built.origin);
-    let mut bounds = None;
+    let mut bounds = None::<Bounds>;
     for (level, handle) in handles.iter().enumerate() {
         let skin = built.levels.get_mut(level).and_then(|level| level.skin.as_mut());
         // A skin of another tree has been refused when it was made.
@@ -71,9 +71,7 @@ fn bend(
         if let Some(mut mesh) = meshes.get_mut(handle) {
             write_vertices(&mut mesh, origin, vertices.iter().copied());
         }
-        if level == 0 {
-            bounds = Some(Bounds::around(vertices));
-        }
+        bounds = Some(Bounds::around(bounds, vertices));
     }
     bounds.map(|Bounds(low, high)| built.box_around([low, high].into_iter()))
 }
@@ -82,10 +80,11 @@ fn bend(
 struct Bounds(Vec3, Vec3);
 
 impl Bounds {
-    fn around(vertices: &[SkinVertex]) -> Self {
+    /// The extent of what is known, and of more vertices.
+    fn around(known: Option<Self>, vertices: &[SkinVertex]) -> Self {
         let first = vertices.first().map_or(Vec3::ZERO, |vertex| vertex.position);
         let around = |Self(low, high), vertex: &SkinVertex| Self(low.min(vertex.position), high.max(vertex.position));
-        vertices.iter().fold(Self(first, first), around)
+        vertices.iter().fold(known.unwrap_or(Self(first, first)), around)
     }
 }
 

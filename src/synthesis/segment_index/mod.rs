@@ -5,6 +5,7 @@
 //! a growth.
 
 mod index;
+mod overlaps;
 mod ray_cast;
 mod region;
 pub(crate) mod round_cone;
@@ -12,6 +13,7 @@ mod run;
 mod search;
 
 pub use index::SegmentIndex;
+pub use overlaps::overlaps;
 pub use ray_cast::RayCast;
 pub use region::Region;
 pub(crate) use region::axes;

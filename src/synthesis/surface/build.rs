@@ -1,8 +1,10 @@
 //! The surface of a tree, with a report of what was done.
 
 use super::builder::Builder;
+use super::cage_mesh::as_it_is;
 use super::half_edges::HalfEdges;
-use super::mesh::{SurfaceMesh, assemble};
+use super::limit::finish;
+use super::mesh::SurfaceMesh;
 use super::report::SurfaceReport;
 use super::settings::{SurfaceError, SurfaceSettings};
 use super::shape::Shape;
@@ -44,16 +46,14 @@ impl Surface {
             return Err(SurfaceError::TooManyFaces { faces });
         }
         let mut half_edges = HalfEdges::of_paced(cage, &pace.part(0.3..0.4)).await;
-        for _ in 0..settings.level {
-            half_edges = half_edges.refined_paced(&pace.part(0.4..0.6)).await;
-        }
-        let (mut positions, normals) = if settings.level > 0 {
-            half_edges.limits_paced(&pace.part(0.6..0.8)).await
+        let mesh = if settings.level == 0 {
+            as_it_is(half_edges, origin, &pace.part(0.4..1.0)).await
         } else {
-            (half_edges.vertices.positions.clone(), half_edges.face_normals())
+            for _ in 1..settings.level {
+                half_edges = half_edges.refined_paced(&pace.part(0.4..0.6)).await;
+            }
+            finish(&half_edges, origin, &pace.part(0.6..1.0)).await
         };
-        positions.iter_mut().for_each(|position| *position += origin);
-        let mesh = assemble(half_edges, positions, normals, &pace.part(0.8..1.0)).await;
         Ok(Self { mesh, report })
     }
 }

@@ -104,20 +104,8 @@ impl<'a> Builder<'a> {
                 (Start { length: 0.0, normal: Vec3::ZERO, columns: Columns::even(sides, FRAC_PI_4), sides }, None)
             }
         };
+        self.find_exits(trunk);
         let curve = &self.curves[trunk];
-        self.exits.clear();
-        for &lateral in self.trunks.laterals(trunk) {
-            let Base::Joint { at, .. } = self.trunks.base(lateral as usize) else { continue };
-            let branch = &self.curves[lateral as usize];
-            let exit = Exit::new(lateral, curve, curve.length_of(at as usize), branch);
-            self.report.laterals += 1;
-            let ends_within = self.trunks.laterals(lateral as usize).is_empty() && exit.ends_within(curve, branch);
-            if ends_within {
-                self.holes[lateral as usize] = Some(Hole::Absorbed);
-            } else {
-                self.exits.push(exit);
-            }
-        }
         let from = start.length + if edge.is_some() { 0.3 * curve.radius_at(start.length) } else { 0.0 };
         let mut rows = rows(curve, &self.exits, self.shape, from, curve.length());
         self.rings.lay(curve, &start, &mut rows, self.shape);
@@ -125,6 +113,29 @@ impl<'a> Builder<'a> {
         self.add_belts(&rows);
         self.add_ends(trunk, edge);
         self.open_holes(trunk, &rows);
+    }
+
+    /// The exits of a trunk's laterals. Laterals of one that ends within the trunk leave the trunk itself.
+    fn find_exits(&mut self, trunk: usize) {
+        let curve = &self.curves[trunk];
+        self.exits.clear();
+        let joint = |lateral: u32| match self.trunks.base(lateral as usize) {
+            Base::Joint { at, .. } => curve.length_of(at as usize),
+            Base::Root => 0.0,
+        };
+        let laterals = self.trunks.laterals(trunk).iter();
+        let mut pending: Vec<(u32, f32)> = laterals.rev().map(|&lateral| (lateral, joint(lateral))).collect();
+        while let Some((lateral, joint)) = pending.pop() {
+            let branch = &self.curves[lateral as usize];
+            let exit = Exit::new(lateral, curve, joint, branch);
+            self.report.laterals += 1;
+            if exit.ends_within(curve, branch) {
+                self.holes[lateral as usize] = Some(Hole::Absorbed);
+                pending.extend(self.trunks.laterals(lateral as usize).iter().rev().map(|&lateral| (lateral, joint)));
+            } else {
+                self.exits.push(exit);
+            }
+        }
     }
 
     /// Vertices of all rings.
@@ -135,7 +146,7 @@ impl<'a> Builder<'a> {
             let node = nodes[curve.place_at(ring.length)];
             self.bases.push(self.cage.vertices.positions.len() as u32);
             let radius = ring.station.radius;
-            let wide = radius * self.shape.swell(ring.sides);
+            let wide = ring.radius * self.shape.swell(ring.sides);
             for side in 0..ring.sides {
                 let (sine, cosine) = ops::sin_cos(self.rings.angles[(ring.first_angle + side) as usize]);
                 self.cage.vertices.push(ring.point([cosine, sine], wide), radius, node);

@@ -15,7 +15,7 @@ pub(super) enum End {
 /// Heights and widths of the rings of a round end, in radii, by the logarithm of the sides over 4; fitted so that the
 /// limit is nearest to half a ball.
 const ROUND: [&[[f32; 2]]; 3] =
-    [&[[0.85, 0.75]], &[[0.55, 0.87], [0.98, 0.5]], &[[0.35, 0.96], [0.68, 0.78], [0.96, 0.45]]];
+    [&[[0.987, 1.002]], &[[0.329, 1.022], [0.987, 0.472]], &[[0.420, 1.023], [0.978, 0.372]]];
 /// The same of a pointed end.
 const POINTED: [&[[f32; 2]]; 3] = [
     &[[1.2, 0.72], [2.6, 0.3], [3.0, 0.12]],

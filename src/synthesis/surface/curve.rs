@@ -10,6 +10,12 @@ use bevy_math::{Quat, Vec3};
 
 /// Distance between kept nodes, in radii.
 const SPACING: f32 = 1.0;
+/// Angle that counts as much as a bulge of a radius.
+const WIDENING: f32 = 4.0;
+/// Length at both ends of a long segment over which the curve turns, in radii.
+const EASE: f32 = 5.0;
+/// Distance of knots up to which bulges count, in radii.
+const NEAR: f32 = 6.0;
 /// Segments shorter than this share of the radius have no direction of their own.
 const POINT: f32 = 1e-3;
 
@@ -40,10 +46,12 @@ struct Knot {
     right: Vec3,
     /// Length from the base.
     length: f32,
-    /// Angle by which the curve has turned since the base.
+    /// Angle by which the curve has turned since the base, with bulges of its radius.
     turned: f32,
-    /// Place among the trunk's nodes.
+    /// Place among the trunk's nodes; for a point on a segment, that of the node before it.
     place: u32,
+    /// Whether it is a point on a segment.
+    is_between: bool,
 }
 
 /// A node's place on the curve and its radius.
@@ -72,6 +80,7 @@ pub(super) struct Lean {
 pub(super) struct Curve {
     knots: Vec<Knot>,
     marks: Vec<Mark>,
+    eased: Vec<Knot>,
     lean: Lean,
 }
 
@@ -83,12 +92,16 @@ impl Curve {
         self.lean = Lean::default();
         self.set_marks(tree, nodes, is_lateral);
         self.keep_nodes(tree, nodes, origin);
+        self.ease_long_segments();
         self.set_directions();
         self.set_lengths();
-        for (first, second) in (0..self.knots.len().saturating_sub(1)).map(|first| (first, first + 1)) {
-            let [from, to] = [first, second].map(|knot| self.knots[knot].length);
-            let places = self.knots[first].place as usize..=self.knots[second].place as usize;
-            spread(&mut self.marks[places], from, to);
+        let mut before: Option<Knot> = None;
+        for knot in self.knots.iter().filter(|knot| !knot.is_between) {
+            if let Some(before) = before {
+                let places = before.place as usize..=knot.place as usize;
+                spread(&mut self.marks[places], before.length, knot.length);
+            }
+            before = Some(*knot);
         }
         // A tip that coincides with the knot before it.
         let beyond = self.knots.last().map_or(0, |knot| knot.place as usize);
@@ -130,6 +143,7 @@ impl Curve {
             length: 0.0,
             turned: 0.0,
             place: place as u32,
+            is_between: false,
         };
         self.knots.clear();
         self.knots.push(knot(0));
@@ -146,6 +160,25 @@ impl Curve {
         if last > 0 && self.knots[self.knots.len() - 1].center.distance(knot(last).center) > least {
             self.knots.push(knot(last));
         }
+    }
+
+    /// Keeps long segments straight but near their ends: a spline from node to node would bow out of them.
+    fn ease_long_segments(&mut self) {
+        self.eased.clear();
+        for pair in self.knots.windows(2) {
+            let [a, b] = [pair[0], pair[1]];
+            let chord = b.center - a.center;
+            let reach = EASE * self.marks[b.place as usize].end_radius;
+            let length = chord.length();
+            self.eased.push(a);
+            if length > 3.0 * reach {
+                let share = reach / length;
+                let between = |share: f32| Knot { center: a.center + chord * share, is_between: true, ..a };
+                self.eased.extend([between(share), between(1.0 - share)]);
+            }
+        }
+        self.eased.extend(self.knots.last());
+        std::mem::swap(&mut self.knots, &mut self.eased);
     }
 
     /// Tangents, weighted so that they are those of a circle through three knots; frames by the least rotation.
@@ -211,9 +244,21 @@ impl Curve {
             length += halves + (halves - chord) / 3.0;
             turned += a.ahead.angle_between(unit(b.center - a.center).unwrap_or(a.ahead));
             turned += b.ahead.angle_between(unit(b.center - a.center).unwrap_or(b.ahead));
+            turned += WIDENING * self.unevenness(knot, a.center.distance(b.center));
             self.knots[knot].length = length;
             self.knots[knot].turned = turned;
         }
+    }
+
+    /// How far the radius at a knot is from the mean of its neighbours', as a share. Only knots near each other count:
+    /// farther apart, a radius that changes along a segment is a cone as the segment is.
+    fn unevenness(&self, knot: usize, chord: f32) -> f32 {
+        let radius = |knot: usize| self.marks[self.knots[knot].place as usize].end_radius;
+        let here = radius(knot);
+        if knot + 1 == self.knots.len() || chord > NEAR * here {
+            return 0.0;
+        }
+        (here - 0.5 * (radius(knot - 1) + radius(knot + 1))).abs() / here
     }
 
     /// Length of the whole curve.
@@ -244,12 +289,30 @@ impl Curve {
         mark.start_radius + share * (mark.end_radius - mark.start_radius)
     }
 
-    /// How far the curve has turned from the base to a length, in radians.
+    /// How far the curve has turned from the base to a length, in radians, with bulges of its radius.
     pub fn turned_at(&self, length: f32) -> f32 {
         let Some((first, second)) = self.span(length) else { return 0.0 };
         let [a, b] = [first, second].map(|knot| self.knots[knot]);
         let share = ((length - a.length) / (b.length - a.length)).clamp(0.0, 1.0);
         a.turned + share * (b.turned - a.turned)
+    }
+
+    /// The length after another one by an effort, which counts length and turn at two rates.
+    pub fn after(&self, length: f32, effort: f32, rates: [f32; 2]) -> f32 {
+        let Some((_, mut next)) = self.span(length) else { return length + effort / rates[0] };
+        let (mut at, mut turned, mut left) = (length, self.turned_at(length), effort);
+        loop {
+            let knot = &self.knots[next];
+            let needed = (knot.length - at) * rates[0] + (knot.turned - turned) * rates[1];
+            if needed >= left && needed > 0.0 {
+                return at + (knot.length - at) * (left / needed);
+            }
+            if next + 1 == self.knots.len() {
+                return knot.length.max(at) + (left - needed.max(0.0)) / rates[0];
+            }
+            (at, turned, left) = (knot.length.max(at), knot.turned, left - needed.max(0.0));
+            next += 1;
+        }
     }
 
     /// The knots on both sides of a length, `None` for a curve without length.

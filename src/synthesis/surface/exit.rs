@@ -48,15 +48,15 @@ impl Exit {
         Self { lateral, length, radius, point, half: HALF_EDGE * radius / slope.max(0.5), slope }
     }
 
-    /// Whether the lateral, with its round end, lies within the trunk.
+    /// Whether the lateral's centre line ends within the trunk.
     pub fn ends_within(&self, trunk: &Curve, curve: &Curve) -> bool {
         let tip = curve.at(curve.length());
         let station = trunk.at(self.length);
         let out = tip.center - station.center;
         let along = out.dot(station.ahead);
         let aside = (out - station.ahead * along).length();
-        let ends = (0.0..=trunk.length()).contains(&(self.length + along));
-        curve.length() < 4.0 * station.radius && ends && aside + tip.radius < station.radius
+        let is_beside = (0.0..=trunk.length()).contains(&(self.length + along));
+        curve.length() < 4.0 * station.radius && is_beside && aside < station.radius
     }
 
     /// The angle of the opening around a station of the trunk.
@@ -70,7 +70,7 @@ impl Exit {
         // Half of the angle between the lateral and the way straight out: the first ring is tilted by that much.
         let tilt = 0.5 * ops::acos(self.slope.min(1.0));
         let height = radius + self.radius * (CLEARANCE + ops::sin(tilt));
-        let most = 4.0 * height / self.slope;
+        let most = 2.0 * height / self.slope;
         let mut lift = height / self.slope;
         // The lateral may bend: a few steps towards the length at which it has that height.
         for _ in 0..4 {
@@ -78,6 +78,7 @@ impl Exit {
             let out = (center - station.ahead * station.ahead.dot(center)).length();
             lift = (lift + (height - out) / self.slope).clamp(0.5 * height, most);
         }
-        lift
+        // A lateral that hardly leaves the trunk ends where it would end.
+        lift.min(curve.length().max(height.min(most)))
     }
 }

@@ -1,19 +1,17 @@
 //! Catmull–Clark subdivision on half-edges.
 //!
-//! In: a closed cage of polygons. Out: quads, their vertices in the limit of subdivision, with limit normals.
+//! In: a closed cage of polygons. Out: the same with four times as many faces, all quads.
 //!
 //! A half-edge is a corner of a face and the edge that leaves it; its twin runs along the same edge in the other face.
 //! Each refinement makes one quad for each half-edge, in its place: half-edges 4h to 4h + 3 belong to half-edge h. So the
 //! refined twins follow from the old ones, and every step is a loop over arrays. Sources: Catmull & Clark,
 //! "Recursively generated B-spline surfaces on arbitrary topological meshes" (1978); Dupuy & Vanhoey, "A halfedge
-//! refinement rule for parallel Catmull–Clark subdivision" (2021); limit masks after Halstead, Kass & DeRose, "Efficient,
-//! fair interpolation using Catmull–Clark surfaces" (1993).
+//! refinement rule for parallel Catmull–Clark subdivision" (2021).
 
 use super::cage::{Cage, Vertices};
 use super::trunks::unit;
 use crate::synthesis::pace::Pace;
-use bevy_math::{Vec2, Vec3, ops};
-use std::f32::consts::{PI, TAU};
+use bevy_math::{Vec2, Vec3};
 
 const NONE: u32 = u32::MAX;
 
@@ -90,9 +88,15 @@ impl HalfEdges {
 
     /// The next subdivision.
     pub async fn refined_paced(&self, pace: &Pace) -> Self {
-        let old = self.vertices.positions.len();
-        let face_count = self.face_starts.len() - 1;
+        let split = self.split_paced(&pace.part(0.0..0.6)).await;
+        self.quads_of(split, &pace.part(0.6..1.0)).await
+    }
+
+    /// The vertices of the next subdivision.
+    pub async fn split_paced(&self, pace: &Pace) -> Split {
+        let (old, face_count) = (self.vertices.positions.len(), self.face_starts.len() - 1);
         let edges = self.edge_numbers();
+        pace.rest(0.1).await;
         let count = old + face_count + self.len() / 2;
         let mut vertices = Vertices {
             positions: Vec::with_capacity(count),
@@ -102,29 +106,35 @@ impl HalfEdges {
         vertices.positions.resize(old, Vec3::ZERO);
         vertices.radii.extend_from_slice(&self.vertices.radii);
         vertices.nodes.extend_from_slice(&self.vertices.nodes);
-        let mut face_of = vec![0; self.len()];
-        let mut face_uvs = Vec::with_capacity(face_count);
-        for (face, range) in (old as u32..).zip(self.face_starts.windows(2)) {
-            let range = range[0] as usize..range[1] as usize;
-            let share = 1.0 / range.len() as f32;
-            let (mut sum, mut radius, mut uv) = (Vec3::ZERO, 0.0, Vec2::ZERO);
-            for half_edge in range.clone() {
-                let corner = self.origins[half_edge] as usize;
-                sum += self.vertices.positions[corner];
-                radius += self.vertices.radii[corner];
-                uv += self.uvs[half_edge];
-                face_of[half_edge] = face;
-            }
-            vertices.push(sum * share, radius * share, self.vertices.nodes[self.origins[range.start] as usize]);
-            face_uvs.push(uv * share);
+        let mut split = Split {
+            vertices,
+            face_of: vec![0; self.len()],
+            face_uvs: Vec::with_capacity(face_count),
+            edges,
+            first_face: old as u32,
+            first_edge: (old + face_count) as u32,
+        };
+        pace.part(0.1..0.4).each(face_count, |face| self.push_face_point(face, &mut split)).await;
+        let moved = pace.part(0.4..0.7).collect(old, |vertex| self.moved(vertex, &split)).await;
+        pace.part(0.7..1.0).each(self.len(), |half_edge| self.push_edge_point(half_edge as u32, &mut split)).await;
+        split.vertices.positions[..old].copy_from_slice(&moved);
+        split
+    }
+
+    fn push_face_point(&self, face: usize, split: &mut Split) {
+        let range = self.face_starts[face] as usize..self.face_starts[face + 1] as usize;
+        let share = 1.0 / range.len() as f32;
+        let (mut sum, mut radius, mut uv) = (Vec3::ZERO, 0.0, Vec2::ZERO);
+        for half_edge in range.clone() {
+            let corner = self.origins[half_edge] as usize;
+            sum += self.vertices.positions[corner];
+            radius += self.vertices.radii[corner];
+            uv += self.uvs[half_edge];
+            split.face_of[half_edge] = split.first_face + face as u32;
         }
-        pace.rest(0.3).await;
-        let face_points = &vertices.positions[old..];
-        let moved = (0..old).map(|vertex| self.moved(vertex, &face_of, face_points)).collect::<Vec<_>>();
-        pace.rest(0.5).await;
-        self.push_edge_points(&mut vertices, &face_of);
-        vertices.positions[..old].copy_from_slice(&moved);
-        self.quads_of(vertices, &face_of, &face_uvs, &edges)
+        let node = self.vertices.nodes[self.origins[range.start] as usize];
+        split.vertices.push(sum * share, radius * share, node);
+        split.face_uvs.push(uv * share);
     }
 
     /// A number of each half-edge's edge, in the order of the edges' first half-edges.
@@ -141,7 +151,7 @@ impl HalfEdges {
     }
 
     /// The half-edges that leave a vertex.
-    fn around(&self, vertex: usize) -> impl Iterator<Item = u32> + '_ {
+    pub fn around(&self, vertex: usize) -> impl Iterator<Item = u32> + '_ {
         let first = self.leaving[vertex];
         let mut next = (first != NONE).then_some(first);
         std::iter::from_fn(move || {
@@ -152,85 +162,83 @@ impl HalfEdges {
         })
     }
 
-    fn moved(&self, vertex: usize, face_of: &[u32], face_points: &[Vec3]) -> Vec3 {
+    fn moved(&self, vertex: usize, split: &Split) -> Vec3 {
         let here = self.vertices.positions[vertex];
-        let old = self.vertices.positions.len() as u32;
         let (mut sum, mut count) = (Vec3::ZERO, 0.0);
         for half_edge in self.around(vertex) {
-            let end = self.origins[self.faces.next(half_edge) as usize];
-            sum += self.vertices.positions[end as usize] + face_points[(face_of[half_edge as usize] - old) as usize];
+            let end = self.origins[self.next(half_edge) as usize];
+            sum += self.vertices.positions[end as usize] + split.position(split.face_of[half_edge as usize]);
             count += 1.0;
         }
         here + (sum - here * (2.0 * count)) / (count * count)
     }
 
-    fn push_edge_points(&self, vertices: &mut Vertices, face_of: &[u32]) {
-        for half_edge in 0..self.len() as u32 {
-            let twin = self.twins[half_edge as usize];
-            if twin < half_edge {
-                continue;
-            }
-            let [a, b] = [half_edge, twin].map(|half_edge| self.origins[half_edge as usize] as usize);
-            let faces = [half_edge, twin].map(|half_edge| vertices.positions[face_of[half_edge as usize] as usize]);
-            let ends = self.vertices.positions[a] + self.vertices.positions[b];
-            let radius = 0.5 * (self.vertices.radii[a] + self.vertices.radii[b]);
-            vertices.push(0.25 * (ends + (faces[0] + faces[1])), radius, self.vertices.nodes[a]);
+    fn push_edge_point(&self, half_edge: u32, split: &mut Split) {
+        let twin = self.twins[half_edge as usize];
+        if twin < half_edge {
+            return;
         }
+        let [a, b] = [half_edge, twin].map(|half_edge| self.origins[half_edge as usize] as usize);
+        let faces = [half_edge, twin].map(|half_edge| split.position(split.face_of[half_edge as usize]));
+        let ends = self.vertices.positions[a] + self.vertices.positions[b];
+        let radius = 0.5 * (self.vertices.radii[a] + self.vertices.radii[b]);
+        split.vertices.push(0.25 * (ends + (faces[0] + faces[1])), radius, self.vertices.nodes[a]);
     }
 
-    fn quads_of(&self, vertices: Vertices, face_of: &[u32], face_uvs: &[Vec2], edges: &[u32]) -> Self {
-        let (old, count) = (self.vertices.positions.len() as u32, self.len());
-        let first_edge = old + face_uvs.len() as u32;
+    async fn quads_of(&self, split: Split, pace: &Pace) -> Self {
+        let count = self.len();
         let (mut origins, mut twins, mut uvs) =
             (Vec::with_capacity(4 * count), Vec::with_capacity(4 * count), Vec::with_capacity(4 * count));
-        let mut leaving = vec![NONE; vertices.positions.len()];
-        for half_edge in 0..count as u32 {
-            let (next, previous) = (self.faces.next(half_edge), self.faces.previous(half_edge));
+        let mut leaving = vec![NONE; split.vertices.positions.len()];
+        let quad = |half_edge: usize| {
+            let half_edge = half_edge as u32;
+            let (next, previous) = (self.next(half_edge), self.previous(half_edge));
             let [here, after, before] = [half_edge, next, previous].map(|half_edge| half_edge as usize);
-            let quad = [self.origins[here], first_edge + edges[here], face_of[here], first_edge + edges[before]];
-            for (corner, vertex) in quad.into_iter().enumerate() {
+            let quad = [self.origins[here], split.edge(half_edge), split.face_of[here], split.edge(previous)];
+            for (corner, vertex) in (4 * half_edge..).zip(quad) {
                 if leaving[vertex as usize] == NONE {
-                    leaving[vertex as usize] = 4 * half_edge + corner as u32;
+                    leaving[vertex as usize] = corner;
                 }
             }
             origins.extend_from_slice(&quad);
-            let across = self.faces.next(self.twins[here]);
+            let across = self.next(self.twins[here]);
             twins.extend_from_slice(&[4 * across + 3, 4 * next + 2, 4 * previous + 1, 4 * self.twins[before]]);
-            let (uv, face) = (self.uvs[here], face_uvs[(face_of[here] - old) as usize]);
-            uvs.extend_from_slice(&[uv, 0.5 * (uv + self.uvs[after]), face, 0.5 * (self.uvs[before] + uv)]);
-        }
+            let uv = self.uvs[here];
+            uvs.extend_from_slice(&[
+                uv,
+                0.5 * (uv + self.uvs[after]),
+                split.face_uv(half_edge),
+                0.5 * (self.uvs[before] + uv),
+            ]);
+        };
+        pace.each(count, quad).await;
         let face_starts = (0..=count as u32).map(|face| 4 * face).collect();
-        Self { vertices, origins, uvs, twins, leaving, faces: Faces::Quads, face_starts }
+        Self { vertices: split.vertices, origins, uvs, twins, leaving, faces: Faces::Quads, face_starts }
     }
 
-    /// Positions and unit normals in the limit of subdivision. All faces must be quads.
-    pub async fn limits_paced(&self, pace: &Pace) -> (Vec<Vec3>, Vec<Vec3>) {
-        pace.rest(0.0).await;
-        let masks = Masks::new();
-        (0..self.vertices.positions.len()).map(|vertex| self.limit(vertex, &masks)).unzip()
+    /// The half-edge after one around its face.
+    pub fn next(&self, half_edge: u32) -> u32 {
+        self.faces.next(half_edge)
     }
 
-    fn limit(&self, vertex: usize, masks: &Masks) -> (Vec3, Vec3) {
-        let here = self.vertices.positions[vertex];
-        let valence = self.around(vertex).count();
-        let weights = masks.of(valence);
-        let (mut ends, mut diagonals) = (Vec3::ZERO, Vec3::ZERO);
-        let mut tangents = [Vec3::ZERO; 2];
-        for (place, half_edge) in self.around(vertex).enumerate() {
-            let after = self.faces.next(half_edge);
-            let end = self.vertices.positions[self.origins[after as usize] as usize] - here;
-            let diagonal = self.vertices.positions[self.origins[self.faces.next(after) as usize] as usize] - here;
-            ends += end;
-            diagonals += diagonal;
-            let [along, aside] = weights.at(place);
-            for side in 0..2 {
-                tangents[side] += end * along[side] + diagonal * aside[side];
-            }
-        }
-        let n = valence as f32;
-        let position = here + (4.0 * ends + diagonals) / (n * (n + 5.0));
-        let normal = unit(tangents[0].cross(tangents[1])).unwrap_or_else(|| self.mean_normal(vertex));
-        (position, normal)
+    /// The half-edge before one around its face.
+    pub fn previous(&self, half_edge: u32) -> u32 {
+        self.faces.previous(half_edge)
+    }
+
+    /// The half-edge along the same edge in the other face.
+    pub fn twin(&self, half_edge: u32) -> u32 {
+        self.twins[half_edge as usize]
+    }
+
+    /// The number of faces.
+    pub fn face_count(&self) -> usize {
+        self.face_starts.len() - 1
+    }
+
+    /// The half-edges of a face.
+    pub fn face(&self, face: usize) -> std::ops::Range<u32> {
+        self.face_starts[face]..self.face_starts[face + 1]
     }
 
     /// Normals of the faces around each vertex, weighted by area: for a cage without subdivision.
@@ -250,10 +258,34 @@ impl HalfEdges {
             .sum();
         unit(sum).unwrap_or(Vec3::Z)
     }
+}
 
-    /// Vertices of each face, without end.
-    pub fn faces(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
-        self.face_starts.windows(2).map(|range| range[0] as usize..range[1] as usize)
+/// The vertices of the next subdivision: first the old ones, moved, then one in each face, then one on each edge.
+#[derive(Debug)]
+pub(super) struct Split {
+    pub vertices: Vertices,
+    /// Vertex in the face of each half-edge.
+    pub face_of: Vec<u32>,
+    face_uvs: Vec<Vec2>,
+    edges: Vec<u32>,
+    pub first_face: u32,
+    pub first_edge: u32,
+}
+
+impl Split {
+    /// The vertex on a half-edge's edge.
+    pub fn edge(&self, half_edge: u32) -> u32 {
+        self.first_edge + self.edges[half_edge as usize]
+    }
+
+    /// Texture coordinates of the vertex in a half-edge's face.
+    pub fn face_uv(&self, half_edge: u32) -> Vec2 {
+        self.face_uvs[(self.face_of[half_edge as usize] - self.first_face) as usize]
+    }
+
+    /// Position of a vertex.
+    pub fn position(&self, vertex: u32) -> Vec3 {
+        self.vertices.positions[vertex as usize]
     }
 }
 
@@ -291,40 +323,4 @@ fn pair(origins: &[u32], next: &[u32], vertices: usize) -> (Vec<u32>, Vec<u32>) 
         ends[low] += 1;
     }
     (twins, leaving)
-}
-
-/// Weights of the limit tangents by valence.
-struct Masks {
-    by_valence: Vec<Mask>,
-}
-
-/// For each place around a vertex, the weights of the edge's end and of the face's far corner, for two tangents.
-struct Mask(Vec<[[f32; 2]; 2]>);
-
-impl Mask {
-    fn new(valence: usize) -> Self {
-        let step = TAU / valence as f32;
-        let weight = 1.0 + ops::cos(step) + ops::cos(PI / valence as f32) * (2.0 * (9.0 + ops::cos(step))).sqrt();
-        let angle = |place: usize| place as f32 * step;
-        let mask = (0..valence).map(|place| {
-            let (here, after) = (ops::sin_cos(angle(place)), ops::sin_cos(angle(place + 1)));
-            // Half-edges around a vertex are met anticlockwise.
-            [[weight * here.1, weight * here.0], [here.1 + after.1, here.0 + after.0]]
-        });
-        Self(mask.collect())
-    }
-
-    fn at(&self, place: usize) -> [[f32; 2]; 2] {
-        self.0[place]
-    }
-}
-
-impl Masks {
-    fn new() -> Self {
-        Self { by_valence: (0..32).map(|valence: usize| Mask::new(valence.max(1))).collect() }
-    }
-
-    fn of(&self, valence: usize) -> &Mask {
-        &self.by_valence[valence.min(self.by_valence.len() - 1)]
-    }
 }

@@ -1,6 +1,5 @@
 //! The mesh of a surface: what is drawn, bent and written to files.
 
-use super::half_edges::HalfEdges;
 use super::trunks::unit;
 use crate::synthesis::mesh::Closure;
 use crate::synthesis::pace::Pace;
@@ -77,78 +76,25 @@ impl SurfaceMesh {
     }
 }
 
-/// The mesh of half-edges, with vertices at these positions.
-pub(super) async fn assemble(
-    half_edges: HalfEdges,
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    pace: &Pace,
-) -> SurfaceMesh {
-    pace.rest(0.0).await;
-    const NONE: u32 = u32::MAX;
-    let unique = positions.len();
-    let mut mesh = SurfaceMesh { positions, normals, ..SurfaceMesh::default() };
-    // Copies of a vertex are a chain from the vertex on.
-    let mut next = vec![NONE; unique];
-    mesh.uvs = vec![Vec2::NAN; unique];
-    let mut faces = Vec::with_capacity(half_edges.len() / 4);
-    for face in half_edges.faces() {
-        let mut corners = [0; 5];
-        let count = face.len();
-        for (slot, half_edge) in face.enumerate() {
-            let (vertex, uv) = (half_edges.origins[half_edge], half_edges.uvs[half_edge]);
-            corners[slot] = mesh.vertex_with(vertex, uv, &mut next);
-        }
-        match corners {
-            [a, b, c, d, _] if count == 4 => faces.push([a, b, c, d]),
-            [a, b, c, d, e] if count == 5 => faces.extend([[a, b, c, d], [a, d, e, e]]),
-            [a, b, c, ..] => faces.push([a, b, c, c]),
-        }
-    }
-    mesh.faces = faces;
-    mesh.radii = half_edges.vertices.radii;
-    mesh.nodes = half_edges.vertices.nodes;
-    for &original in &mesh.copies {
-        let original = original as usize;
-        mesh.positions.push(mesh.positions[original]);
-        mesh.normals.push(mesh.normals[original]);
-        mesh.radii.push(mesh.radii[original]);
-        mesh.nodes.push(mesh.nodes[original]);
-    }
-    mesh.set_tangents();
-    mesh
-}
-
 impl SurfaceMesh {
-    /// The vertex itself if it has these coordinates or none yet, or a copy that has them.
-    fn vertex_with(&mut self, vertex: u32, uv: Vec2, next: &mut Vec<u32>) -> u32 {
-        const NONE: u32 = u32::MAX;
-        if self.uvs[vertex as usize].is_nan() {
-            self.uvs[vertex as usize] = uv;
-            return vertex;
+    /// Adds what follows from the rest: all but the texture coordinates of copies, and tangents.
+    pub(super) async fn complete(&mut self, pace: &Pace) {
+        for &original in &self.copies {
+            let original = original as usize;
+            self.positions.push(self.positions[original]);
+            self.normals.push(self.normals[original]);
+            self.radii.push(self.radii[original]);
+            self.nodes.push(self.nodes[original]);
         }
-        let mut here = vertex;
-        loop {
-            if self.uvs[here as usize] == uv {
-                return here;
-            }
-            if next[here as usize] == NONE {
-                break;
-            }
-            here = next[here as usize];
-        }
-        let copy = self.uvs.len() as u32;
-        next[here as usize] = copy;
-        next.push(NONE);
-        self.uvs.push(uv);
-        self.copies.push(vertex);
-        copy
+        pace.rest(0.2).await;
+        self.set_tangents(pace).await;
     }
 
     /// Tangents: the direction of rising u on the faces around each vertex, across its normal.
-    fn set_tangents(&mut self) {
+    async fn set_tangents(&mut self, pace: &Pace) {
         let mut sums = vec![Vec3::ZERO; self.positions.len()];
-        for &[a, b, c, d] in &self.faces {
+        let add = |face: usize| {
+            let [a, b, c, d] = self.faces[face];
             let [pa, pb, pc, pd] = [a, b, c, d].map(|vertex| self.positions[vertex as usize]);
             let [ua, ub, uc, ud] = [a, b, c, d].map(|vertex| self.uvs[vertex as usize]);
             let (across, along) = ((pb + pc) - (pa + pd), (pc + pd) - (pa + pb));
@@ -159,7 +105,8 @@ impl SurfaceMesh {
             for vertex in [a, b, c, d] {
                 sums[vertex as usize] += tangent;
             }
-        }
+        };
+        pace.part(0.2..0.7).each(self.faces.len(), add).await;
         self.tangents = sums
             .iter()
             .zip(&self.normals)

@@ -31,12 +31,15 @@
 mod build;
 mod builder;
 mod cage;
+mod cage_mesh;
 mod caps;
+mod check;
 mod coarse;
 mod columns;
 mod curve;
 mod exit;
 mod half_edges;
+mod limit;
 mod mesh;
 mod report;
 mod rings;
@@ -47,6 +50,7 @@ mod sketch;
 mod trunks;
 
 pub use build::Surface;
+pub use check::SurfaceCheck;
 pub use mesh::SurfaceMesh;
 pub use report::SurfaceReport;
 pub use settings::{SurfaceError, SurfaceSettings, TipCap};

@@ -12,7 +12,7 @@ use super::trunks::unit;
 use bevy_math::Vec3;
 
 /// The longest distance between rings, in radii.
-const LONGEST: f32 = 6.0;
+const LONGEST: f32 = 12.0;
 /// The most by which the curve turns between two rings, in radians.
 const MOST_TURN: f32 = 0.45;
 /// The most rings between two rows; a vessel of a thousand radii without a branch has fewer.
@@ -21,6 +21,12 @@ const MOST_RINGS: f32 = 100_000.0;
 const MOST_TILT: f32 = 0.35;
 /// The least share of their distance by which two rings are apart everywhere.
 const LEAST_APART: f32 = 0.1;
+/// Distance from which rings are not looked at, in radii.
+const FAR: f32 = 3.0;
+/// The most by which a ring is moved or widened for the surface's sake, in radii.
+const MOST_SWELL: f32 = 0.25;
+/// Passes in which rings are left out or tilted.
+const PASSES: usize = 6;
 /// Directions in which the distance of two rings is checked.
 const DIRECTIONS: [[f32; 2]; 8] = {
     const H: f32 = std::f32::consts::FRAC_1_SQRT_2;
@@ -35,6 +41,8 @@ pub(super) struct Ring {
     pub sides: u32,
     /// Normal of its plane.
     pub normal: Vec3,
+    /// Radius of the ring, so that the surface has the station's radius.
+    pub radius: f32,
     /// Its first angle in the list.
     pub first_angle: u32,
     /// Rings of one row have one number, and a common plane. Others may be left out.
@@ -118,7 +126,15 @@ impl Rings {
     fn push(&mut self, curve: &Curve, length: f32, sides: u32, row: Option<u32>) {
         let station = curve.at(length);
         let first_angle = self.angles.len() as u32;
-        self.rings.push(Ring { station, length, sides, normal: station.ahead, first_angle, row });
+        self.rings.push(Ring {
+            station,
+            length,
+            sides,
+            normal: station.ahead,
+            radius: station.radius,
+            first_angle,
+            row,
+        });
     }
 
     /// Rings between two lengths, the ends excluded. Sides change by a factor of 2 from ring to ring.
@@ -127,14 +143,12 @@ impl Rings {
         let factors = last.max(sides).ilog2() - last.min(sides).ilog2();
         // Effort of a stretch: the number of belts that its length and its turn need.
         let radius = curve.radius_at(0.5 * (from + to));
-        let effort = |length: f32| {
-            (length - from) / (LONGEST * radius) + (curve.turned_at(length) - curve.turned_at(from)) / MOST_TURN
-        };
-        let belts = effort(to).min(MOST_RINGS).ceil().max(factors as f32).max(1.0) as u32;
+        let rates = [1.0 / (LONGEST * radius), 1.0 / MOST_TURN];
+        let effort = (to - from) * rates[0] + (curve.turned_at(to) - curve.turned_at(from)) * rates[1];
+        let belts = effort.min(MOST_RINGS).ceil().max(factors as f32).max(1.0) as u32;
         let mut length = from;
         for belt in 1..belts {
-            let wanted = effort(to) * belt as f32 / belts as f32;
-            length = root(&effort, wanted, [length, to]);
+            length = curve.after(length, effort / belts as f32, rates).min(to);
             let left = (belts - belt).min(5);
             let least = (last / 2).max(sides >> left);
             let most = (last * 2).min(sides << left);
@@ -146,11 +160,16 @@ impl Rings {
 
     /// Leaves out or tilts rings that meet their neighbours.
     fn settle(&mut self) {
-        for _ in 0..4 {
+        for ring in &mut self.rings {
+            ring.normal = within_tilt(ring.normal, ring.station.ahead);
+        }
+        for _ in 0..PASSES {
             if !self.settle_once() {
                 break;
             }
         }
+        self.level_bumps();
+        self.swell();
         self.of_rows.clear();
         for (index, ring) in (0u32..).zip(&self.rings) {
             if ring.row == Some(self.of_rows.len() as u32) {
@@ -185,6 +204,46 @@ impl Rings {
         has_changed
     }
 
+    /// Moves and widens rings so that the surface follows the curve.
+    ///
+    /// In the limit, the surface at a ring is a mean of that ring, four times, and of its neighbours: it cuts corners and
+    /// flattens bulges. The rings are moved by as much to the other side.
+    fn swell(&mut self) {
+        for ring in &mut self.rings {
+            ring.radius = ring.station.radius;
+        }
+        let mut before = self.rings[0].station.center;
+        for index in 1..self.rings.len().saturating_sub(1) {
+            let [a, b, c] = [index - 1, index, index + 1].map(|ring| self.rings[ring]);
+            let (from, here, to) = (before, b.station.center, c.station.center);
+            before = here;
+            let (most, ahead) = (MOST_SWELL * b.station.radius, b.station.ahead);
+            let cut = (here - from + here - to) / 6.0;
+            let aside = (cut - ahead * ahead.dot(cut)).clamp_length_max(most);
+            let span = c.length - a.length;
+            let moved = (a.length - 2.0 * b.length + c.length) / 6.0;
+            let slope = if span > 0.0 { (c.station.radius - a.station.radius) / span } else { 0.0 };
+            let flattened = (2.0 * b.station.radius - a.station.radius - c.station.radius) / 6.0 + slope * moved;
+            let ring = &mut self.rings[index];
+            ring.station.center += aside;
+            ring.radius += flattened.clamp(-most, most);
+        }
+    }
+
+    /// Halves the sides of a ring between two coarser ones: each second of its vertices would have only two edges.
+    fn level_bumps(&mut self) {
+        for index in 1..self.rings.len().saturating_sub(1) {
+            let [before, here, after] = [index - 1, index, index + 1].map(|ring| self.rings[ring].sides);
+            if here > before && here > after {
+                let first = self.rings[index].first_angle as usize;
+                for side in 0..here as usize / 2 {
+                    self.angles[first + side] = self.angles[first + 2 * side];
+                }
+                self.rings[index].sides = here / 2;
+            }
+        }
+    }
+
     /// Whether a ring between two others may be left out.
     fn may_go(&self, before: usize, ring: usize, after: usize) -> bool {
         let Some(after) = self.rings.get(after) else { return false };
@@ -205,7 +264,8 @@ impl Rings {
         while row(after).is_some() && last + 1 < self.rings.len() && row(last + 1) == row(after) {
             last += 1;
         }
-        let tilted = |ring: &mut Ring| ring.normal = within_tilt(mean, ring.station.ahead);
+        let tilted =
+            |ring: &mut Ring| ring.normal = within_tilt(unit(ring.normal + mean).unwrap_or(mean), ring.station.ahead);
         self.rings[first..=before].iter_mut().for_each(tilted);
         self.rings[after..=last].iter_mut().for_each(tilted);
     }
@@ -216,7 +276,11 @@ fn meet(before: &Ring, after: &Ring) -> bool {
     let (a, b) = (&before.station, &after.station);
     let way = b.center - a.center;
     let radius = a.radius.max(b.radius);
-    // Planes that are nearly alike, far from each other.
+    // Rings that are far from each other only meet if the vessel itself turns back.
+    if way.length_squared() > FAR * FAR * radius * radius {
+        return false;
+    }
+    // Planes that are nearly alike, for their distance.
     let turned = (before.normal - after.normal).length() + (a.ahead - b.ahead).length();
     let ahead = way.dot(before.normal + after.normal);
     if ahead > 0.0 && radius * turned < 0.4 * ahead {
@@ -237,13 +301,4 @@ fn within_tilt(normal: Vec3, ahead: Vec3) -> Vec3 {
     }
     let out = unit(normal - ahead * cosine).unwrap_or(Vec3::ZERO);
     (ahead * MOST_TILT + out * (1.0 - MOST_TILT * MOST_TILT).sqrt()).normalize()
-}
-
-/// Where a rising function has a value, by halving.
-fn root(function: &impl Fn(f32) -> f32, value: f32, [mut low, mut high]: [f32; 2]) -> f32 {
-    for _ in 0..12 {
-        let middle = 0.5 * (low + high);
-        if function(middle) < value { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
 }

@@ -15,8 +15,15 @@ const WIDEST: f32 = 1.5;
 const WIDEST_SHARE: f32 = 0.36;
 /// Room between two openings of a row, as a share of a column's even width.
 const APART: f32 = 0.5;
-/// Room between two rows, in radii of their laterals.
+/// Room between two rows, as a share of half the shorter one.
 const GAP: f32 = 0.3;
+/// Distance of a row from its wish from which it counts as crowded, in halves of its length.
+const FAR: f32 = 0.6;
+/// Factor by which crowded rows are made shorter, and the number of rounds.
+const SHRINK: f32 = 0.6;
+const ROUNDS: usize = 6;
+/// Rows are never squeezed into less than this share of their length; a trunk without that room becomes longer.
+const LEAST_ROOM: f32 = 0.2;
 
 /// An opening of a row.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +82,7 @@ impl Row {
     /// This row with one more exit; `None` if that one has room in a row of its own, or none in this.
     fn with(&self, exit: u32, exits: &[Exit], curve: &Curve, shape: &Shape) -> Option<Self> {
         let here = &exits[exit as usize];
-        let room = GAP * self.radius.min(here.radius);
+        let room = GAP * self.half.min(here.half);
         let overlaps = here.length - here.half < self.length + self.half + room;
         let is_near = (here.length - self.length).abs() < self.half.max(here.half);
         if !(overlaps && is_near) {
@@ -132,30 +139,55 @@ impl Row {
     }
 }
 
-/// Moves rows so that they don't overlap, by the least squares weighted with their radii, and between two lengths.
+/// Moves rows so that they don't overlap, between two lengths.
+///
+/// Rows that would be moved far are made shorter first, since an opening far from its lateral is worse than a narrow one.
+fn place(rows: &mut [Row], from: f32, to: f32) {
+    let wishes: Vec<f32> = rows.iter().map(|row| row.length).collect();
+    for round in 0..ROUNDS {
+        let pools = pooled(rows, &wishes, from, to);
+        let mut first = 0;
+        let mut is_crowded = false;
+        for count in pools {
+            let pool = first..first + count;
+            let is_far = |index: usize| (rows[index].length - wishes[index]).abs() > FAR * rows[index].half;
+            if count > 1 && pool.clone().any(is_far) {
+                is_crowded = true;
+                if round + 1 < ROUNDS {
+                    rows[pool].iter_mut().for_each(|row| row.half *= SHRINK);
+                }
+            }
+            first += count;
+        }
+        if !is_crowded {
+            break;
+        }
+    }
+}
+
+/// Moves rows by the least squares, weighted with their radii. Returns the numbers of rows that stand side by side.
 ///
 /// Without the bounds that is an isotonic regression: rows that would overlap are pooled, each pool at the mean of its
-/// rows' wishes.
-fn place(rows: &mut [Row], from: f32, to: f32) {
-    let gap = |a: &Row, b: &Row| GAP * a.radius.min(b.radius);
-    let needed = |rows: &[Row]| {
-        let halves: f32 = rows.iter().map(|row| 2.0 * row.half).sum();
-        halves + rows.windows(2).map(|pair| gap(&pair[0], &pair[1])).sum::<f32>()
-    };
-    let (total, room) = (needed(rows), (to - from).max(0.0));
-    let squeeze = if total > room && total > 0.0 { room / total } else { 1.0 };
+/// rows' wishes. If all rows together are longer than the room, all are made shorter.
+fn pooled(rows: &mut [Row], wishes: &[f32], from: f32, to: f32) -> Vec<usize> {
+    let gap = |a: &Row, b: &Row| GAP * a.half.min(b.half);
+    let halves: f32 = rows.iter().map(|row| 2.0 * row.half).sum();
+    let needed = halves + rows.windows(2).map(|pair| gap(&pair[0], &pair[1])).sum::<f32>();
+    let room = (to - from).max(LEAST_ROOM * halves);
+    if needed > room {
+        rows.iter_mut().for_each(|row| row.half *= room / needed);
+    }
     // Distance from the first row's middle at which each stands if all stand as close as they can.
     let mut closest = 0.0;
     let mut pools: Vec<(f32, f32, usize)> = Vec::with_capacity(rows.len());
     let mut places = Vec::with_capacity(rows.len());
     for index in 0..rows.len() {
-        rows[index].half *= squeeze;
         if index > 0 {
             let (a, b) = (&rows[index - 1], &rows[index]);
-            closest += a.half + b.half + squeeze * gap(a, b);
+            closest += a.half + b.half + gap(a, b);
         }
         places.push(closest);
-        let mut pool = (rows[index].length - closest, rows[index].radius, 1);
+        let mut pool = (wishes[index] - closest, rows[index].radius, 1);
         while let Some(&(wish, weight, count)) = pools.last()
             && wish > pool.0
         {
@@ -164,14 +196,15 @@ fn place(rows: &mut [Row], from: f32, to: f32) {
         }
         pools.push(pool);
     }
-    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return };
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Vec::new() };
     let least = from + first.half;
     let most = (to - last.half - closest).max(least);
     let mut index = 0;
-    for (wish, _, count) in pools {
+    for &(wish, _, count) in &pools {
         for _ in 0..count {
             rows[index].length = wish.clamp(least, most) + places[index];
             index += 1;
         }
     }
+    pools.into_iter().map(|(.., count)| count).collect()
 }

@@ -1,7 +1,7 @@
 //! How many sides a vessel has, and how wide its cage must be for the surface to be as wide as the vessel.
 
 use super::settings::SurfaceSettings;
-use bevy_math::ops;
+use bevy_math::{Vec2, ops};
 use std::f32::consts::{PI, TAU};
 
 /// Number of different numbers of sides: 4, 8, 16, 32, 64.
@@ -50,11 +50,31 @@ impl Shape {
     }
 }
 
-/// A uniform ring of n vertices shrinks to (4 + 2 cos(2π/n)) / 6 of its radius in the limit, by the mask of cubic
-/// B-splines. The faces of the last level are chords of the limit: they get the circle's area, not its radius.
+/// The radius of a cage's ring around which the subdivided ring has the area of a circle of radius 1.
+///
+/// In the limit, a ring is the cubic B-spline of its vertices. A level's vertices are points of that spline, and its faces
+/// are chords.
 fn swell(sides: u32, level: u32) -> f32 {
-    let shrunk = (4.0 + 2.0 * ops::cos(TAU / sides as f32)) / 6.0;
-    let chord = TAU / (sides << level) as f32;
-    let equal_area = (chord / ops::sin(chord)).sqrt();
-    if level == 0 { 1.0 / shrunk } else { equal_area / shrunk }
+    let step = TAU / sides as f32;
+    // The cage itself is as wide as that of a smooth surface.
+    let parts = 1 << if level == 0 { SurfaceSettings::MOST_LEVEL } else { level };
+    let point = |part: u32| {
+        let t = part as f32 / parts as f32;
+        let weights = [
+            (1.0 - t).powi(3),
+            3.0 * t.powi(3) - 6.0 * t * t + 4.0,
+            1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t.powi(3),
+            t.powi(3),
+        ];
+        let sum = |coordinate: fn(f32) -> f32| {
+            let terms = weights
+                .iter()
+                .enumerate()
+                .map(|(place, weight)| weight / 6.0 * coordinate((place as f32 - 1.0) * step));
+            terms.sum::<f32>()
+        };
+        Vec2::new(sum(ops::cos), sum(ops::sin))
+    };
+    let doubled_area: f32 = (0..parts).map(|part| point(part).perp_dot(point(part + 1))).sum();
+    (TAU / (sides as f32 * doubled_area)).sqrt()
 }

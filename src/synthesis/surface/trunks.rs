@@ -2,12 +2,14 @@
 //!
 //! In: a tree. Out: runs of nodes. A run follows the widest child at each node, unless that turns back by more than a
 //! right angle (the backward connection of Skjermo & Eidheim 2005, section 3): then all children leave the trunk's end
-//! as laterals. The nodes of a root with several children lie in one trunk, from tip to tip.
+//! as laterals. An only child is always followed. The nodes of a root with several children lie in one trunk, from tip to tip.
 
-use crate::synthesis::tree::{NO_PARENT, VesselTree, sweep::Children};
+use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree, sweep::Children};
 use bevy_math::Vec3;
 
 const NONE: u32 = u32::MAX;
+/// Segments over which a direction is measured, at most. Those of traced vessels are shorter than their noise.
+const FEW: usize = 64;
 
 /// Where a trunk begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,18 +125,23 @@ struct Courses {
 impl Courses {
     fn of(tree: &VesselTree) -> Self {
         let children = tree.children();
-        let directions = directions(tree);
         let (mut next, mut back) = (vec![NONE; tree.len()], vec![NONE; tree.len()]);
         for node in 0..tree.len() {
-            let is_root = tree.parents()[node] == NO_PARENT;
-            let ahead = if is_root { Vec3::ZERO } else { directions[node] };
-            next[node] = widest(tree, &children, node, |child| ahead.dot(directions[child]) >= 0.0);
-            if is_root && next[node] != NONE {
-                let first = directions[next[node] as usize];
-                back[node] = widest(tree, &children, node, |child| {
-                    child as u32 != next[node] && first.dot(directions[child]) < 0.0
-                });
+            if let [only] = children.of(node) {
+                next[node] = *only;
+                continue;
             }
+            let leaving = |child: usize| leaving(tree, &children, child);
+            let Some(ahead) = arriving(tree, node) else {
+                next[node] = widest(tree, &children, node, |_| true);
+                if next[node] != NONE {
+                    let first = leaving(next[node] as usize);
+                    let is_other_side = |child: usize| child as u32 != next[node] && first.dot(leaving(child)) < 0.0;
+                    back[node] = widest(tree, &children, node, is_other_side);
+                }
+                continue;
+            };
+            next[node] = widest(tree, &children, node, |child| ahead.dot(leaving(child)) >= 0.0);
         }
         Self { next, back }
     }
@@ -163,13 +170,30 @@ fn widest(tree: &VesselTree, children: &Children, node: usize, may: impl Fn(usiz
     widest
 }
 
-/// Unit direction of every segment. One without length has that of its parent; zero if that has none either.
-fn directions(tree: &VesselTree) -> Vec<Vec3> {
-    let mut directions = vec![Vec3::ZERO; tree.len()];
-    tree.fold_to_tips(&mut directions, |node, parent, own| {
-        *own = unit(tree.segment_vector(node)).unwrap_or(*parent);
-    });
-    directions
+/// Unit direction in which a vessel arrives at a node, over a radius; `None` for a root, zero if it has no length.
+fn arriving(tree: &VesselTree, node: usize) -> Option<Vec3> {
+    let here = tree.positions()[node];
+    let mut from = tree.parent(NodeId(node as u32))?;
+    for _ in 0..FEW {
+        match tree.parent(from) {
+            Some(before) if tree.positions()[from.index()].distance(here) < tree.radii()[node] => from = before,
+            _ => break,
+        }
+    }
+    Some(unit(here - tree.positions()[from.index()]).unwrap_or(Vec3::ZERO))
+}
+
+/// Unit direction in which a child leaves its parent, over a radius; zero if it has no length.
+fn leaving(tree: &VesselTree, children: &Children, child: usize) -> Vec3 {
+    let from = tree.positions()[tree.parents()[child] as usize];
+    let mut to = child;
+    for _ in 0..FEW {
+        match children.of(to) {
+            [first, ..] if tree.positions()[to].distance(from) < tree.radii()[child] => to = *first as usize,
+            _ => break,
+        }
+    }
+    unit(tree.positions()[to] - from).unwrap_or(Vec3::ZERO)
 }
 
 /// The direction of a vector, also of one whose squared length is too small or too large for f32.
