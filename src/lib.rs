@@ -54,6 +54,9 @@
 //! **My organ is a soft body.** Put [`FollowsMesh`](plugin::FollowsMesh) on it, and its vessels follow its surface.
 //! With [`FollowsTetrahedra`](plugin::FollowsTetrahedra) they follow its inside.
 //!
+//! **I need a closed mesh: to draw, to print or to compute with.** Put a [`VesselSurface`](plugin::VesselSurface) on the
+//! organ. [`SurfaceCommandsExt`](plugin::SurfaceCommandsExt) saves it.
+//!
 //! **Why does nothing grow?** Look at the entity's [`GrowthProgress`](plugin::GrowthProgress) and the log. They name an
 //! unusable mesh, or settings outside their limits, and say what to change.
 
@@ -88,7 +91,8 @@ use bevy::{
     ecs::schedule::ScheduleLabel,
 };
 
-/// Everything that an app with vessels needs: growth, surgery, blood, deformation, and drawing if the app draws.
+/// Everything that an app with vessels needs: growth, surgery, blood, deformation, surfaces, and drawing if the app
+/// draws.
 ///
 /// Add it after `DefaultPlugins`. Vessels also grow in an app without a renderer. Each part is a plugin of its own: an
 /// app that only grows vessels may add [`GrowthPlugin`](plugin::GrowthPlugin) alone.
@@ -103,6 +107,8 @@ pub struct VesselPlugin {
     pub surgery: plugin::SurgeryPlugin,
     /// How blood flows.
     pub circulation: plugin::CirculationPlugin,
+    /// How closed surfaces are made.
+    pub surface: plugin::SurfacePlugin,
     /// How presets are loaded.
     pub scene: plugin::ScenePlugin,
     /// How segments are drawn: how round they are.
@@ -121,6 +127,7 @@ impl VesselPlugin {
             deformation: plugin::DeformationPlugin::in_schedule(schedule),
             surgery: plugin::SurgeryPlugin::in_schedule(schedule),
             circulation: plugin::CirculationPlugin::in_schedule(schedule),
+            surface: plugin::SurfacePlugin::in_schedule(schedule),
             scene: plugin::ScenePlugin::in_schedule(schedule),
             ..self
         }
@@ -135,6 +142,7 @@ impl Plugin for VesselPlugin {
             self.deformation.clone(),
             self.surgery.clone(),
             self.circulation.clone(),
+            self.surface.clone(),
             self.scene.clone(),
         ));
         #[cfg(feature = "render")]

@@ -6,8 +6,8 @@
 //! progress in [`GrowthProgress`] and messages.
 //!
 //! Components on the organ add features beyond growth: [`Cuttable`] for surgery through [`CuttableVessels`],
-//! [`Perfusion`] for blood, [`FollowsMesh`] or [`FollowsTetrahedra`] for soft bodies. An organ without them has no cost
-//! from them.
+//! [`Perfusion`] for blood, [`FollowsMesh`] or [`FollowsTetrahedra`] for soft bodies, [`VesselSurface`] for closed meshes.
+//! An organ without them has no cost from them.
 //!
 //! Each room has a plugin of its own, which may be added alone:
 //!
@@ -17,6 +17,7 @@
 //! | [`DeformationPlugin`] | `deformation` | deformed organs → moved [`Vessels`] |
 //! | [`SurgeryPlugin`] | `surgery` | [`CuttableVessels`], [`VesselCommand`]s → [`VesselWounds`], [`OpenEnd`] entities |
 //! | [`CirculationPlugin`] | `circulation` | [`VesselWounds`] → flow, bleeding, supply of the tissue |
+//! | [`SurfacePlugin`] | `surface` | [`Vessels`], [`VesselWounds`] → [`VesselMesh`], files |
 //! | [`ScenePlugin`] | `scene` | [`PresetAsset`]s → [`Vasculature`]; organs saved in scenes |
 //! | [`VesselsPlugin`] | `vessels` | what all the others need; they add it themselves |
 
@@ -29,6 +30,7 @@ mod lineage;
 mod order;
 mod organ;
 mod scene;
+mod surface;
 mod surgery;
 mod vessels;
 
@@ -46,6 +48,11 @@ pub use job::{JobMode, JobPanic, JobSettings};
 pub use order::VesselSystems;
 pub use organ::{OrganImage, OrganImageError, OrganMeshError, RestMesh, triangle_mesh};
 pub use scene::{PresetAsset, PresetLoadError, PresetLoader, ScenePlugin, VesselPreset};
+pub use surface::{
+    SurfaceAction, SurfaceCommand, SurfaceCommandsExt, SurfaceDetail, SurfaceFailed, SurfaceLevel, SurfaceMoment,
+    SurfaceNotSaved, SurfacePlugin, SurfaceReady, SurfaceSaveError, SurfaceSaved, SurfaceShown, VesselMesh,
+    VesselSurface, VesselSurfaceError,
+};
 pub use surgery::{
     Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, Stroke, StrokeId,
     SurgeryPlugin, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,

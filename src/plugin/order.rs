@@ -29,6 +29,8 @@ pub enum VesselSystems {
     Cut,
     /// Blood flows, and is lost.
     Circulate,
+    /// Closed surfaces are made of vessels that have grown or were cut, and follow them.
+    Surface,
 }
 
 /// Puts the sets of a schedule in their order. The plugin of every room calls this; repeated calls change nothing.
@@ -45,6 +47,7 @@ pub(crate) fn configure(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
             VesselSystems::Follow,
             VesselSystems::Cut,
             VesselSystems::Circulate,
+            VesselSystems::Surface,
         )
             .chain_ignore_deferred(),
     );

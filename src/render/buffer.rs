@@ -42,7 +42,12 @@ pub struct SegmentBuffer {
     pub(super) stumps: Stumps,
     /// Slots for stumps in the buffer, behind those of the nodes.
     pub(super) room: usize,
+    /// Frames for which a mesh has been shown in place of the segments.
+    covered: u32,
 }
+
+/// Frames for which segments are drawn together with a new mesh: until its data and shaders are on the graphics card.
+const OVERLAP: u32 = 10;
 
 impl SegmentBuffer {
     /// Material of all chunks of this vessel entity.
@@ -72,6 +77,16 @@ impl SegmentBuffer {
     /// Number of nodes whose segments fit before the buffer has to grow.
     pub fn capacity(&self) -> usize {
         self.capacity
+    }
+
+    /// Counts a frame with or without a mesh in place of the segments.
+    pub(super) fn note_cover(&mut self, has_mesh: bool) {
+        self.covered = if has_mesh { self.covered.saturating_add(1) } else { 0 };
+    }
+
+    /// Whether a mesh is drawn, and the segments are not.
+    pub(super) fn is_covered(&self) -> bool {
+        self.covered > OVERLAP
     }
 
     /// Whether it has got its colours.
@@ -166,6 +181,7 @@ pub(super) fn attach_buffers(
             warned_of_limit: false,
             room: stumps.room(),
             stumps,
+            covered: 0,
         });
     }
 }

@@ -14,12 +14,17 @@
 //! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often:
 //! vessels grow everywhere at once, so even 256 consecutive segments reach over three quarters of an organ.
 //!
-//! Without a GPU, or with one that lacks storage buffers (WebGL 2), nothing is drawn and growth goes on, with one
-//! warning.
+//! Once vessels have a closed mesh ([`VesselMesh`](crate::plugin::VesselMesh)), that is drawn in their place, by Bevy's
+//! standard material, in levels of detail that fade into each other.
+//!
+//! Without a GPU nothing is drawn and growth goes on. With one that lacks storage buffers (WebGL 2), closed meshes are
+//! drawn and segments are not, with one warning.
 
+use crate::plugin::{SurfaceLevel, VesselAppearance, VesselMesh};
 use bevy::{
     asset::{AssetEventSystems, embedded_asset},
     camera::{CameraUpdateSystems, visibility::VisibilitySystems},
+    ecs::schedule::common_conditions::{any_match_filter, any_with_component},
     pbr::PbrPlugin,
     prelude::*,
     render::{
@@ -39,6 +44,7 @@ mod limits;
 mod material;
 mod segments;
 mod stumps;
+mod surfaces;
 mod template;
 mod upload;
 
@@ -129,6 +135,7 @@ impl Plugin for SegmentRenderPlugin {
             .init_resource::<VesselMaterials>()
             .init_resource::<SegmentWrites>()
             .add_observer(detach_buffer)
+            .add_observer(surfaces::uncover)
             .configure_sets(
                 PostUpdate,
                 SegmentSystems
@@ -139,7 +146,9 @@ impl Plugin for SegmentRenderPlugin {
             .add_systems(
                 PostUpdate,
                 (
-                    (attach_buffers, update_segments).chain().in_set(SegmentSystems),
+                    (attach_buffers, update_segments, surfaces::hide_covered.run_if(any_with_component::<VesselMesh>))
+                        .chain()
+                        .in_set(SegmentSystems),
                     choose_detail
                         .after(TransformSystems::Propagate)
                         .after(CameraUpdateSystems)
@@ -148,6 +157,7 @@ impl Plugin for SegmentRenderPlugin {
                         .run_if(resource_exists::<SegmentLimits>),
                 ),
             );
+        build_surfaces(app);
         build_render_app(app);
     }
 
@@ -159,8 +169,8 @@ impl Plugin for SegmentRenderPlugin {
                 match SegmentLimits::new(&device.limits(), flags, slots) {
                     Some(limits) => drop(app.insert_resource(limits)),
                     None => warn!(
-                        "vessels are not drawn: this graphics backend has no storage buffers for vertices, or no compute \
-                         shaders"
+                        "segments are not drawn: this graphics backend has no storage buffers for vertices, or no compute \
+                         shaders; with a VesselSurface, vessels are drawn once they have grown"
                     ),
                 }
             }
@@ -168,6 +178,24 @@ impl Plugin for SegmentRenderPlugin {
             (None, ..) => {}
         }
     }
+}
+
+/// Closed meshes are drawn by any GPU.
+fn build_surfaces(app: &mut App) {
+    let look = (
+        surfaces::dress_levels.run_if(any_match_filter::<Added<SurfaceLevel>>),
+        surfaces::recolor_levels.run_if(any_match_filter::<Changed<VesselAppearance>>),
+    );
+    app.add_systems(
+        PostUpdate,
+        (
+            look.chain().before(AssetEventSystems),
+            surfaces::range_levels
+                .after(TransformSystems::Propagate)
+                .before(VisibilitySystems::CheckVisibility)
+                .run_if(any_with_component::<VesselMesh>),
+        ),
+    );
 }
 
 fn build_render_app(app: &mut App) {

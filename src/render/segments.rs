@@ -10,7 +10,7 @@ use super::{
     upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
-    plugin::{ChangeLog, Changes, SegmentSupply, VesselAppearance, VesselWounds, Vessels, VesselsOf},
+    plugin::{ChangeLog, Changes, SegmentSupply, VesselAppearance, VesselMesh, VesselWounds, Vessels, VesselsOf},
     synthesis::instances::{SegmentInstance, segment_instance},
 };
 use bevy::{
@@ -44,6 +44,7 @@ pub(super) struct DrawnVessels {
     log: &'static ChangeLog,
     wounds: Option<&'static VesselWounds>,
     supply: Option<Ref<'static, SegmentSupply>>,
+    mesh: Option<&'static VesselMesh>,
     segments: &'static mut SegmentBuffer,
 }
 
@@ -54,8 +55,14 @@ pub(super) fn update_segments(
     mut store: SegmentStore,
 ) {
     for mut drawn in &mut drawn {
+        // What is not drawn is not kept up to date, colours included.
+        let was_covered = drawn.segments.is_covered();
+        drawn.segments.bypass_change_detection().note_cover(drawn.mesh.is_some_and(VesselMesh::is_shown));
+        if drawn.segments.is_covered() {
+            continue;
+        }
         let appearance = appearances.get(drawn.organ.0).ok();
-        let restyled = !drawn.segments.has_look() || appearance.as_ref().is_some_and(Ref::is_changed);
+        let restyled = was_covered || !drawn.segments.has_look() || appearance.as_ref().is_some_and(Ref::is_changed);
         let blanched = drawn.segments.follows_supply() && drawn.supply.as_ref().is_some_and(Ref::is_changed);
         if drawn.segments.drawn.is_current(drawn.log) && !restyled && !blanched {
             continue;

@@ -27,6 +27,7 @@ const PLUGIN: &str = "
  surgery        vessels
  circulation    organ  vessels  growth  surgery
  deformation    organ  vessels  growth
+ surface        organ  vessels  growth
  scene          growth
 ";
 
@@ -42,6 +43,7 @@ const RENDER: &str = "
  detail         levels  chunk  template
  buffer         levels  chunk  material  stumps
  segments       levels  limits  chunk  material  upload  detail  buffer
+ surfaces       chunk  material  buffer
 ";
 
 /// A table: the name of each row, with its entries.

@@ -23,6 +23,7 @@ mod registry;
 mod scene;
 mod sources;
 mod splitting;
+mod surface;
 mod units;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};

@@ -5,7 +5,7 @@ use bevy::{
     ecs::reflect::{ReflectComponent, ReflectEvent, ReflectMessage, ReflectResource},
     reflect::{TypeRegistration, TypeRegistry},
 };
-use bevy_vessels::plugin::{Cuttable, JobSettings, Perfusion, VesselAppearance};
+use bevy_vessels::plugin::{Cuttable, JobSettings, Perfusion, SurfaceShown, VesselAppearance, VesselSurface};
 use std::{fs, path::Path};
 
 /// Types that are not registered, and why.
@@ -16,6 +16,7 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("SegmentBuffer", "buffers on the graphics card"),
     ("ChangeLog", "what changed in which frame"),
     ("VesselIndex", "made anew from the Vessels"),
+    ("VesselMesh", "made anew from the Vessels"),
 ];
 
 /// A public type of the plugin or the renderer, and what it derives.
@@ -107,6 +108,7 @@ fn settings_survive_a_file() {
     assert_round_trip(&VesselAppearance { shown: Default::default(), ..default() });
     assert_round_trip(&Cuttable::default());
     assert_round_trip(&quick());
+    assert_round_trip(&VesselSurface { shows: SurfaceShown::Preview, detail: None, ..default() });
     assert_round_trip(&JobSettings { at_once: 3, ..default() });
     let budget = GrowthBudget::Steps(3);
     assert_eq!(ron::from_str(&ron::to_string(&budget).expect("a budget")), Ok(budget));

@@ -11,6 +11,7 @@ mod headless;
 mod detail;
 mod flight;
 mod stage;
+mod surfaces;
 mod wounds;
 
 use bevy::{

@@ -8,5 +8,6 @@ mod flow;
 mod indexed;
 mod ledger;
 mod random_actions;
+mod remains;
 mod stumps;
 mod withdrawal;

@@ -37,7 +37,7 @@ pub use preset_asset::{PresetAsset, PresetLoadError, PresetLoader};
 ///
 /// | component | what is kept |
 /// |---|---|
-/// | settings, such as [`Vasculature`](crate::plugin::Vasculature), [`OrganPaint`](crate::plugin::OrganPaint) and [`Perfusion`](crate::plugin::Perfusion) | everything |
+/// | settings, such as [`Vasculature`](crate::plugin::Vasculature), [`OrganPaint`](crate::plugin::OrganPaint), [`Perfusion`](crate::plugin::Perfusion) and [`VesselSurface`](crate::plugin::VesselSurface) | everything |
 /// | [`GrowthProgress`](crate::plugin::GrowthProgress) | the number of steps, which are done at once after loading |
 /// | [`Vessels`](crate::plugin::Vessels) that grew | their kind, and a hash: they grow again from mesh, settings and seed |
 /// | [`Vessels`](crate::plugin::Vessels) of a [given tree](crate::plugin::Vessels::from_tree) | everything, at rest |
@@ -45,6 +45,7 @@ pub use preset_asset::{PresetAsset, PresetLoadError, PresetLoader};
 /// | [`CirculationState`](crate::plugin::CirculationState) | how far open ends have clotted |
 /// | [`Patient`](crate::plugin::Patient), [`BloodLoss`](crate::plugin::BloodLoss) | everything |
 /// | [`OpenEnd`](crate::plugin::OpenEnd) entities | nothing: the wounds spawn them again |
+/// | [`VesselMesh`](crate::plugin::VesselMesh) | nothing: it is made again |
 ///
 /// Wounds belong to their tree. If another tree grew because the mesh or the settings changed, they are dropped with a
 /// warning. A scene has no mesh and no image that was not loaded from a file: give the organ its `Mesh3d` or

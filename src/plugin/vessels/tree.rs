@@ -44,6 +44,8 @@ pub struct Vessels {
     kind: VesselKind,
     tree: VesselTree,
     lineage: Lineage,
+    /// Number of times that the tree at rest has changed.
+    edits: u64,
     birth_steps: Vec<u32>,
     /// First child of every node, [`NO_PARENT`] for none.
     first_children: Vec<u32>,
@@ -67,6 +69,7 @@ impl Vessels {
             kind,
             tree: VesselTree::new(),
             lineage: Lineage::default(),
+            edits: 0,
             birth_steps: Vec::new(),
             first_children: Vec::new(),
             next_siblings: Vec::new(),
@@ -122,6 +125,7 @@ impl Vessels {
             let (position, radius, birth) = state(node);
             self.push(position, tree.parents()[node], radius, birth);
         }
+        self.edits += u64::from(!changed.is_empty() || known < tree.len());
         self.mark(&changed, known, log);
     }
 
@@ -134,6 +138,16 @@ impl Vessels {
     /// [`FollowsMesh`](crate::plugin::FollowsMesh) its nodes move with the deformed organ.
     pub fn tree(&self) -> &VesselTree {
         &self.tree
+    }
+
+    /// Number of times that the tree at rest has changed. Within a lineage it only rises; deformation changes nothing.
+    pub(crate) fn edits(&self) -> u64 {
+        self.edits
+    }
+
+    /// Whether the nodes are elsewhere than at rest.
+    pub(crate) fn is_deformed(&self) -> bool {
+        self.rest.is_some()
     }
 
     /// Identity of the tree.
@@ -181,6 +195,7 @@ impl Vessels {
     ) {
         let changed = changed.filter(|_| self.lineage == lineage && log.is_of(lineage));
         self.is_grown = true;
+        self.edits += 1;
         if changed.is_none() {
             self.clear();
             self.lineage = lineage;

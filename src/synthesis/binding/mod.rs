@@ -9,11 +9,14 @@
 //! corners of the one that contains it, so it follows any affine motion exactly; a node outside all of them follows the
 //! nearest by extrapolation.
 //!
+//! The closed surface of the vessels is bound to their nodes in turn, by a [`Skin`].
+//!
 //! Radii stay as they are: the narrowing of a stretched vessel depends on its pressure, which is not known here. Cuts
 //! are not known, either. A [`Place`](crate::synthesis::tree::Place) on a segment moves with the segment's ends, so a
 //! cut stays at the same spot of the vessel.
 
 mod frames;
+mod skin;
 mod surface;
 mod tetrahedra;
 mod vertices;
@@ -24,6 +27,7 @@ use crate::synthesis::{
     tree::VesselTree,
 };
 use bevy_math::Vec3;
+pub use skin::{Skin, SkinVertex};
 use surface::SurfaceBonds;
 use tetrahedra::SolidBonds;
 
@@ -47,6 +51,18 @@ pub enum BindingError {
         bound: usize,
         /// Nodes given.
         given: usize,
+    },
+    /// A vertex of a vessel's surface that belongs to a node that the tree doesn't have.
+    #[error(
+        "vertex {vertex} of the surface belongs to node {node}, but the tree has {nodes}; give the tree that it was made of"
+    )]
+    VertexNode {
+        /// The first such vertex.
+        vertex: usize,
+        /// Its node.
+        node: u32,
+        /// Nodes of the tree.
+        nodes: usize,
     },
     /// A vertex that is infinite or NaN.
     #[error(

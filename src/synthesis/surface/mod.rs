@@ -7,6 +7,8 @@
 //! quads, in which laterals leave through holes; Catmull–Clark subdivision makes it smooth. Closed it is by
 //! construction: every edge is made with both of its faces.
 //!
+//! For views from afar there are [`Surface::coarse`], closed as well, and [`Surface::sketch`], a prism for each branch.
+//!
 //! Source: Skjermo & Eidheim, "Polygon mesh generation of branching structures" (2005), with two deviations. Their
 //! cross-sections are squares; here they have more sides the wider the vessel is (with
 //! [`most_sides`](SurfaceSettings::most_sides) 4, theirs). Their laterals leave from a face as wide as the trunk, which
@@ -32,6 +34,7 @@ mod cage;
 mod cage_mesh;
 mod caps;
 mod check;
+mod coarse;
 mod columns;
 mod curve;
 mod direction;
@@ -44,6 +47,7 @@ mod rings;
 mod rows;
 mod settings;
 mod shape;
+mod sketch;
 mod trunks;
 
 pub use build::Surface;

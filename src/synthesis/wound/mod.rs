@@ -3,8 +3,8 @@
 //! In: a [`VesselTree`](super::tree::VesselTree), a [`Blade`] in its space, and a
 //! [`SegmentIndex`](super::segment_index::SegmentIndex). Out: a [`WoundReport`] for each action, with every end that it
 //! opened or closed; and at any time [`Wounds`], which gives the flow how far blood may go ([`Wounds::interruptions`])
-//! and a renderer the remaining pieces of a vessel ([`Wounds::pieces`]). Their look is defined in
-//! [`instances`](super::instances).
+//! and a renderer the remaining pieces of a vessel ([`Wounds::pieces`]); their look is defined in
+//! [`instances`](super::instances). [`Remains`] is the tree that is left.
 //!
 //! The tree itself is never changed: wounds are laid over it, each at a share of a segment. So growth, which only
 //! appends, and deformation, which moves nodes, can continue, and undo is exact.
@@ -52,6 +52,7 @@ mod history;
 mod injury;
 mod ledger;
 mod pieces;
+mod remains;
 mod report;
 mod retraction;
 #[cfg(feature = "serialize")]
@@ -64,5 +65,6 @@ pub use crossing::{Severed, severed};
 pub use error::WoundError;
 pub use ledger::Wounds;
 pub use pieces::{Blockage, PieceEnd, PieceKind, SegmentPiece};
+pub use remains::Remains;
 pub use report::{ClampId, EndId, SeveredEnd, WoundReport};
 pub use retraction::Retraction;
