@@ -1,4 +1,4 @@
-//! Arteries and veins grow over a procedural colon, and over the mucosa inside it.
+//! Arteries and veins grow over a procedural colon, and over the mucosa inside it. Once grown, they become closed meshes.
 //!
 //! Every seed gives another colon. Turn it with the left mouse button, move it with the right, zoom with the wheel.
 //!
@@ -9,6 +9,7 @@
 //! | `N` | the next seed |
 //! | `A`, `V` | arteries, veins on and off |
 //! | `C` | colour by kind, radius, age, Strahler order |
+//! | `M` | closed meshes, or segments as while they grow |
 //! | `I` | view from inside; then ↑ and ↓ travel along the lumen |
 //!
 //! `--mesh FILE.glb` takes your own organ, in any unit. `--headless` draws to files instead of a window, which is also
@@ -24,6 +25,7 @@ mod wish;
 
 use bevy::prelude::*;
 use bevy_vessels::{
+    plugin::VesselSurface,
     prelude::*,
     synthesis::{mesh::ShadedMesh, organ::ColonSettings},
 };
@@ -87,7 +89,7 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     let mut spawn = |name: &'static str, mesh: ShadedMesh, vessels: Option<Vasculature>| {
         let mut organ = assets.spawn(&mut commands, mesh.into(), args.organ.tint(Color::WHITE), place);
         organ.insert(Name::new(name));
-        vessels.map(|vessels| organ.insert(vessels));
+        vessels.map(|vessels| organ.insert((vessels, VesselSurface::default())));
     };
     let outside = args.organ.vessels(Some(&colon.roots), 1.4);
     if args.organ.mode == Mode::Surface {
@@ -117,8 +119,10 @@ fn spawn_loaded(
     mut shots: ResMut<Shots>,
 ) {
     let tint = args.organ.tint(OrganArgs::FLESH);
-    assets
-        .spawn(&mut commands, loaded.mesh.clone(), tint, loaded.place)
-        .insert((Name::new("organ"), args.organ.vessels(None, 1.4)));
+    assets.spawn(&mut commands, loaded.mesh.clone(), tint, loaded.place).insert((
+        Name::new("organ"),
+        args.organ.vessels(None, 1.4),
+        VesselSurface::default(),
+    ));
     shots.0 = vec![Shot { file: "colon.png", view: front_view(), field_of_view: 42.0, endoscope: false }];
 }

@@ -5,23 +5,27 @@ use super::{
     studio::{StatusLine, View},
 };
 use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, light::NotShadowCaster, prelude::*};
-use bevy_vessels::prelude::*;
+use bevy_vessels::{
+    plugin::{SurfaceShown, VesselSurface},
+    prelude::*,
+};
 
 /// Help for the keys of [`ControlsPlugin`].
-pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours";
+pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours\nM  closed mesh or segments";
 
 /// An organ of the example, with or without vessels.
 #[derive(Component)]
 pub struct Organ;
 
-/// With a window: space pauses, `.` steps, `A` and `V` toggle arteries and veins, `C` changes the meaning of colours.
+/// With a window: space pauses, `.` steps, `A` and `V` toggle arteries and veins, `C` changes the meaning of colours,
+/// `M` switches between closed meshes and segments.
 pub struct ControlsPlugin;
 
 impl Plugin for ControlsPlugin {
     fn build(&self, app: &mut App) {
         let in_window = resource_exists_and_equals(View::Window);
         app.add_plugins(FrameTimeDiagnosticsPlugin::default())
-            .add_systems(Update, (steer, show, tell).chain().run_if(in_window));
+            .add_systems(Update, (steer, show, switch, tell).chain().run_if(in_window));
     }
 }
 
@@ -81,6 +85,15 @@ fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>
             SegmentColoring::Age => SegmentColoring::StrahlerOrder,
             SegmentColoring::StrahlerOrder => SegmentColoring::Supply,
             SegmentColoring::Supply => SegmentColoring::Kind,
+        };
+    }
+}
+
+fn switch(keys: Res<ButtonInput<KeyCode>>, mut surfaces: Query<&mut VesselSurface>) {
+    for mut surface in surfaces.iter_mut().filter(|_| keys.just_pressed(KeyCode::KeyM)) {
+        surface.shows = match surface.shows {
+            SurfaceShown::Mesh => SurfaceShown::Preview,
+            SurfaceShown::Preview => SurfaceShown::Mesh,
         };
     }
 }

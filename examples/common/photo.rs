@@ -11,7 +11,7 @@ use bevy::{
     render::view::screenshot::{Screenshot, ScreenshotCaptured},
 };
 use bevy_vessels::{
-    plugin::OrganVessels,
+    plugin::{OrganVessels, VesselMesh, VesselSurface},
     prelude::*,
     synthesis::{
         io::{SwcOptions, save_swc},
@@ -59,6 +59,8 @@ impl Plugin for PhotoPlugin {
 
 /// Frames for which a view is drawn before its picture is taken, so that shadows and buffers are up to date.
 const STILL_FRAMES: u32 = 2;
+/// Frames for which segments are still drawn under a closed mesh that takes their place.
+const HANDOVER_FRAMES: u32 = 12;
 /// Pixels drawn for one pixel of a picture, along each side.
 pub const OVERSAMPLING: u32 = 2;
 
@@ -66,6 +68,8 @@ pub const OVERSAMPLING: u32 = 2;
 struct Session {
     grown: bool,
     frame_times: Vec<Duration>,
+    /// Frames to wait before the first picture.
+    handover: u32,
     shot: usize,
     still: u32,
     waiting: bool,
@@ -88,6 +92,8 @@ fn grow(
     args: Res<StudioArgs>,
     (time, shots): (Res<Time<Real>>, Res<Shots>),
     organs: Query<(Entity, &GrowthProgress)>,
+    surfaces: Query<(), With<VesselSurface>>,
+    vessels: Query<Option<&VesselMesh>, With<Vessels>>,
     mut session: ResMut<Session>,
     mut budget: ResMut<GrowthBudget>,
     mut commands: MessageWriter<GrowthCommand>,
@@ -105,7 +111,11 @@ fn grow(
     if session.frame_times.len() > args.frames as usize {
         commands.write_batch(organs.iter().map(|(organ, ..)| GrowthCommand::new(organ, GrowthAction::Finish)));
     }
-    session.grown = organs.iter().all(|(.., progress)| progress.is_finished());
+    let has_meshes = !surfaces.is_empty();
+    let is_settled = |mesh: Option<&VesselMesh>| mesh.is_some_and(|mesh| mesh.is_shown() || mesh.error().is_some());
+    session.grown =
+        organs.iter().all(|(.., progress)| progress.is_finished()) && (!has_meshes || vessels.iter().all(is_settled));
+    session.handover = if has_meshes { HANDOVER_FRAMES } else { 0 };
 }
 
 fn photograph(
@@ -148,7 +158,7 @@ fn photograph(
         endoscope.0 = shot.endoscope;
     }
     session.still = if ready.0 { session.still + 1 } else { 0 };
-    if session.still > STILL_FRAMES {
+    if session.still > STILL_FRAMES.max(session.handover) {
         session.waiting = true;
         let path = args.out.join(shot.file);
         commands.spawn(Screenshot::image(target.0.clone())).observe(
@@ -160,7 +170,13 @@ fn photograph(
                         exit.write(AppExit::error());
                     }
                 }
-                *session = Session { shot: session.shot + 1, still: 0, waiting: false, ..std::mem::take(&mut session) };
+                *session = Session {
+                    shot: session.shot + 1,
+                    still: 0,
+                    waiting: false,
+                    handover: 0,
+                    ..std::mem::take(&mut session)
+                };
             },
         );
     }

@@ -5,8 +5,8 @@
 
 use super::build::Surface;
 use super::coarse::corner;
+use super::direction::unit;
 use super::mesh::SurfaceMesh;
-use super::trunks::unit;
 use crate::synthesis::pace::{Pace, SHORT_STRETCH, at_once};
 use crate::synthesis::segment_index::start_radius;
 use crate::synthesis::tree::{NO_PARENT, VesselTree};
