@@ -22,7 +22,7 @@ fn grow(seed: u64) -> [VesselTree; 2] {
     let settings = generator.colonization().expect("presets colonize").clone();
     let settings =
         ColonizationSettings { steps: settings.steps.min(30), samples: settings.samples.min(300), ..settings };
-    let mut growth = Colonization::new(case.tissue.clone(), settings, &case.roots, seed).expect("a growth");
+    let mut growth = Colonization::new(case.tissue.clone(), settings, &case.roots, seed).expect(case.name);
     growth.run();
     [VesselKind::Artery, VesselKind::Vein].map(|kind| (*growth.tree(kind)).clone())
 }

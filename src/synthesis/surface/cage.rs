@@ -16,6 +16,7 @@ pub(super) struct Vertices {
 }
 
 impl Vertices {
+    #[inline]
     pub fn push(&mut self, position: Vec3, radius: f32, node: u32) -> u32 {
         self.positions.push(position);
         self.radii.push(radius);
@@ -37,6 +38,7 @@ pub(super) struct Cage {
 }
 
 impl Cage {
+    #[inline]
     pub fn face<const N: usize>(&mut self, corners: [u32; N], uvs: [Vec2; N]) {
         self.corners.extend_from_slice(&corners);
         self.uvs.extend_from_slice(&uvs);

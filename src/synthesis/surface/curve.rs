@@ -5,7 +5,10 @@
 //! curve is a cubic Hermite spline with unit speed at the nodes; the radius is that of the round cones.
 
 use super::direction::{across, turn, unit};
-use crate::synthesis::{segment_index::MAX_FLARE, tree::VesselTree};
+use crate::synthesis::{
+    segment_index::MAX_FLARE,
+    tree::{NO_PARENT, VesselTree},
+};
 use bevy_math::Vec3;
 
 /// Distance between kept nodes, in radii.
@@ -13,7 +16,7 @@ const SPACING: f32 = 1.0;
 /// Angle that counts as much as a bulge of a radius.
 const WIDENING: f32 = 4.0;
 /// Length at both ends of a long segment over which the curve turns, in radii.
-const EASE: f32 = 5.0;
+const EASE: f32 = 3.0;
 /// Distance of knots up to which bulges count, in radii.
 const NEAR: f32 = 6.0;
 /// Segments shorter than this share of the radius have no direction of their own.
@@ -128,7 +131,9 @@ impl Curve {
             }
             self.marks.push(Mark { chords: length, length: 0.0, end_radius, start_radius });
         }
-        if is_lateral && let [first, second, ..] = &mut self.marks[..] {
+        // A vessel begins as its first segment does.
+        let begins = is_lateral || tree.parents()[nodes[0] as usize] == NO_PARENT;
+        if begins && let [first, second, ..] = &mut self.marks[..] {
             first.end_radius = second.start_radius;
             first.start_radius = second.start_radius;
         }

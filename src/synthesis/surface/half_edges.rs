@@ -25,6 +25,7 @@ enum Faces {
 }
 
 impl Faces {
+    #[inline]
     fn next(&self, half_edge: u32) -> u32 {
         match self {
             Self::Quads => (half_edge & !3) | ((half_edge + 1) & 3),
@@ -32,6 +33,7 @@ impl Faces {
         }
     }
 
+    #[inline]
     fn previous(&self, half_edge: u32) -> u32 {
         match self {
             Self::Quads => (half_edge & !3) | (half_edge.wrapping_sub(1) & 3),
@@ -121,6 +123,7 @@ impl HalfEdges {
         split
     }
 
+    #[inline]
     fn push_face_point(&self, face: usize, split: &mut Split) {
         let range = self.face_starts[face] as usize..self.face_starts[face + 1] as usize;
         let share = 1.0 / range.len() as f32;
@@ -151,6 +154,7 @@ impl HalfEdges {
     }
 
     /// The half-edges that leave a vertex.
+    #[inline]
     pub fn around(&self, vertex: usize) -> impl Iterator<Item = u32> + '_ {
         let first = self.leaving[vertex];
         let mut next = (first != NONE).then_some(first);
@@ -162,6 +166,7 @@ impl HalfEdges {
         })
     }
 
+    #[inline]
     fn moved(&self, vertex: usize, split: &Split) -> Vec3 {
         let here = self.vertices.positions[vertex];
         let (mut sum, mut count) = (Vec3::ZERO, 0.0);
@@ -173,16 +178,18 @@ impl HalfEdges {
         here + (sum - here * (2.0 * count)) / (count * count)
     }
 
+    #[inline]
     fn push_edge_point(&self, half_edge: u32, split: &mut Split) {
         let twin = self.twins[half_edge as usize];
         if twin < half_edge {
             return;
         }
-        let [a, b] = [half_edge, twin].map(|half_edge| self.origins[half_edge as usize] as usize);
-        let faces = [half_edge, twin].map(|half_edge| split.position(split.face_of[half_edge as usize]));
+        let (a, b) = (self.origins[half_edge as usize] as usize, self.origins[twin as usize] as usize);
+        let face = |half_edge: u32| split.position(split.face_of[half_edge as usize]);
+        let faces = face(half_edge) + face(twin);
         let ends = self.vertices.positions[a] + self.vertices.positions[b];
         let radius = 0.5 * (self.vertices.radii[a] + self.vertices.radii[b]);
-        split.vertices.push(0.25 * (ends + (faces[0] + faces[1])), radius, self.vertices.nodes[a]);
+        split.vertices.push(0.25 * (ends + faces), radius, self.vertices.nodes[a]);
     }
 
     async fn quads_of(&self, split: Split, pace: &Pace) -> Self {
@@ -217,16 +224,19 @@ impl HalfEdges {
     }
 
     /// The half-edge after one around its face.
+    #[inline]
     pub fn next(&self, half_edge: u32) -> u32 {
         self.faces.next(half_edge)
     }
 
     /// The half-edge before one around its face.
+    #[inline]
     pub fn previous(&self, half_edge: u32) -> u32 {
         self.faces.previous(half_edge)
     }
 
     /// The half-edge along the same edge in the other face.
+    #[inline]
     pub fn twin(&self, half_edge: u32) -> u32 {
         self.twins[half_edge as usize]
     }
@@ -274,16 +284,19 @@ pub(super) struct Split {
 
 impl Split {
     /// The vertex on a half-edge's edge.
+    #[inline]
     pub fn edge(&self, half_edge: u32) -> u32 {
         self.first_edge + self.edges[half_edge as usize]
     }
 
     /// Texture coordinates of the vertex in a half-edge's face.
+    #[inline]
     pub fn face_uv(&self, half_edge: u32) -> Vec2 {
         self.face_uvs[(self.face_of[half_edge as usize] - self.first_face) as usize]
     }
 
     /// Position of a vertex.
+    #[inline]
     pub fn position(&self, vertex: u32) -> Vec3 {
         self.vertices.positions[vertex as usize]
     }

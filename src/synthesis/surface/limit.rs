@@ -71,6 +71,7 @@ struct Limits<'a> {
 type Neighbour = [Vec3; 2];
 
 impl Limits<'_> {
+    #[inline]
     fn of_vertex(&self, vertex: usize) -> (Vec3, Vec3) {
         let center = self.split.position(vertex as u32);
         let neighbour = |half_edge: u32| {
@@ -91,6 +92,7 @@ impl Limits<'_> {
         self.limit(center, &neighbours)
     }
 
+    #[inline]
     fn of_face(&self, face: usize) -> (Vec3, Vec3) {
         let center = self.split.position(self.split.first_face + face as u32);
         let range = self.half_edges.face(face);
@@ -101,22 +103,26 @@ impl Limits<'_> {
             [self.split.position(self.split.edge(before)), self.split.position(corner)]
         };
         if range.len() == 4 {
-            return regular(center, std::array::from_fn(|place| neighbour(first + place as u32)));
+            let neighbours = [neighbour(first), neighbour(first + 1), neighbour(first + 2), neighbour(first + 3)];
+            return regular(center, neighbours);
         }
         self.limit(center, &range.clone().map(neighbour).collect::<Vec<_>>())
     }
 
+    #[inline]
     fn of_edge(&self, half_edge: u32) -> (Vec3, Vec3) {
         let (mesh, split) = (self.half_edges, self.split);
-        let side = |here: u32, there: u32| {
-            let face = split.position(split.face_of[here as usize]);
-            let corner = split.position(mesh.origins[here as usize]);
-            let beside = [mesh.previous(here), mesh.next(there)].map(|half_edge| split.position(split.edge(half_edge)));
-            [[face, beside[0]], [corner, beside[1]]]
-        };
         let twin = mesh.twin(half_edge);
-        let ([a, b], [c, d]) = (side(half_edge, twin), side(twin, half_edge));
-        regular(split.position(split.edge(half_edge)), [a, b, c, d])
+        let face = |half_edge: u32| split.position(split.face_of[half_edge as usize]);
+        let corner = |half_edge: u32| split.position(mesh.origins[half_edge as usize]);
+        let edge = |half_edge: u32| split.position(split.edge(half_edge));
+        let neighbours = [
+            [face(half_edge), edge(mesh.previous(half_edge))],
+            [corner(half_edge), edge(mesh.next(twin))],
+            [face(twin), edge(mesh.previous(twin))],
+            [corner(twin), edge(mesh.next(half_edge))],
+        ];
+        regular(edge(half_edge), neighbours)
     }
 
     /// The limit at a vertex, and its normal.
@@ -137,6 +143,7 @@ impl Limits<'_> {
 }
 
 /// The limit at a vertex with four edges: there, the surface is a bicubic B-spline.
+#[inline]
 fn regular(center: Vec3, neighbours: [Neighbour; 4]) -> (Vec3, Vec3) {
     let [[e0, f0], [e1, f1], [e2, f2], [e3, f3]] = neighbours;
     let ends = (e0 + e2) + (e1 + e3);
@@ -148,9 +155,16 @@ fn regular(center: Vec3, neighbours: [Neighbour; 4]) -> (Vec3, Vec3) {
 }
 
 /// The unit normal of two tangents; if they vanish, that of the faces around.
+#[inline]
 fn normal_of(tangents: [Vec3; 2], center: Vec3, neighbours: &[Neighbour]) -> Vec3 {
     let normal = tangents[0].cross(tangents[1]);
-    normal.try_normalize().or_else(|| unit(normal)).unwrap_or_else(|| fan_normal(center, neighbours))
+    normal.try_normalize().unwrap_or_else(|| unusual_normal(normal, center, neighbours))
+}
+
+/// The same for a normal that has no length, or one too small for its square.
+#[cold]
+fn unusual_normal(normal: Vec3, center: Vec3, neighbours: &[Neighbour]) -> Vec3 {
+    unit(normal).unwrap_or_else(|| fan_normal(center, neighbours))
 }
 
 /// The mean normal of the faces around a vertex, weighted by area: for one whose limit tangents vanish.
@@ -252,6 +266,7 @@ impl Charts {
     }
 
     /// The quad in the place of a half-edge.
+    #[inline]
     fn quad(&self, mesh: &HalfEdges, split: &Split, half_edge: u32) -> [u32; 4] {
         let edge = |half_edge: u32| match self.edges[half_edge as usize] {
             NONE => split.edge(half_edge),

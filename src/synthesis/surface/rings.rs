@@ -14,7 +14,7 @@ use bevy_math::Vec3;
 /// The longest distance between rings, in radii.
 const LONGEST: f32 = 12.0;
 /// The most by which the curve turns between two rings, in radians.
-const MOST_TURN: f32 = 0.35;
+const MOST_TURN: f32 = 0.4;
 /// The most rings between two rows; a vessel of a thousand radii without a branch has fewer.
 const MOST_RINGS: f32 = 100_000.0;
 /// Cosine of the most by which a plane is tilted against its curve.
