@@ -14,7 +14,7 @@
 //! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often:
 //! vessels grow everywhere at once, so even 256 consecutive segments reach over three quarters of an organ.
 //!
-//! Once vessels have a closed mesh ([`VesselMesh`](crate::plugin::VesselMesh)), that is drawn in their place, by Bevy's
+//! Once vessels have a closed mesh ([`VesselMesh`]), that is drawn in their place, by Bevy's
 //! standard material, in levels of detail that fade into each other.
 //!
 //! Without a GPU nothing is drawn and growth goes on. With one that lacks storage buffers (WebGL 2), closed meshes are

@@ -7,7 +7,7 @@
 //! of the sum of their outer products, found by the iteration of Müller et al. 2016, "A robust method to extract the
 //! rotational part of deformations"). Segments in one line say nothing of the turn around that line; there, the rotation
 //! of the node before counts, so that vessels don't twist. A vertex keeps its offset from the axis of its segment, in
-//! the rotation of both of the segment's nodes, blended by where it lies along it. So joints are as smooth as at rest,
+//! the rotation of both of the segment's nodes, blended by where it lies along it; the axis leaves both nodes as they turn. So joints are as smooth as at rest,
 //! vessels keep their radii however they are stretched, and a rigid motion of the nodes moves all vertices rigidly.
 
 use super::BindingError;
@@ -133,8 +133,9 @@ impl Skin {
             return Err(BindingError::NodeCount { bound: self.segments.len(), given: positions.len() });
         }
         self.turn(positions);
-        let turns = &self.turns;
-        parallel::map_all(&self.bonds, &mut self.moved, WORTH_SHARING, |_, bond| bond.moved(positions, turns));
+        let (turns, segments) = (&self.turns, &self.segments);
+        let moved = |_, bond: &Bond| bond.moved(positions, turns, segments[bond.node as usize].direction);
+        parallel::map_all(&self.bonds, &mut self.moved, WORTH_SHARING, moved);
         Ok(&self.moved)
     }
 
@@ -177,17 +178,29 @@ impl Bond {
     }
 
     #[inline]
-    fn moved(&self, positions: &[Vec3], turns: &[Quat]) -> SkinVertex {
+    fn moved(&self, positions: &[Vec3], turns: &[Quat], direction: Vec3) -> SkinVertex {
         let (parent, node) = (self.parent as usize, self.node as usize);
         let (before, after) = (turns[parent], turns[node]);
         let after = if before.dot(after) < 0.0 { -after } else { after };
         let turn = Mat3::from_quat((before * (1.0 - self.share) + after * self.share).normalize());
-        SkinVertex {
-            position: positions[parent].lerp(positions[node], self.share) + turn * self.offset,
-            normal: turn * self.normal,
-            tangent: turn * self.tangent,
-        }
+        let axis = leaves_as_turned([positions[parent], positions[node]], [before, after], direction, self.share);
+        SkinVertex { position: axis + turn * self.offset, normal: turn * self.normal, tangent: turn * self.tangent }
     }
+}
+
+/// The point of a moved segment's axis at a share of the way: on a cubic that leaves both nodes as their rotations turn
+/// the segment's direction at rest. So the wall around a joint turns as one, whichever of its segments a vertex has.
+#[inline]
+fn leaves_as_turned([from, to]: [Vec3; 2], turns: [Quat; 2], direction: Vec3, share: f32) -> Vec3 {
+    let chord = to - from;
+    let along = direction * chord.length();
+    let straight = from + chord * share;
+    if along == Vec3::ZERO {
+        return straight;
+    }
+    let rest = 1.0 - share;
+    let [first, last] = turns.map(|turn| turn * along - chord);
+    straight + (first * rest - last * share) * (share * rest)
 }
 
 /// The segments around a vertex. A surface's faces may be longer than segments, so that a vertex lies beside another
@@ -200,12 +213,19 @@ struct Nearby<'a> {
 impl Nearby<'_> {
     /// The most segments between a vertex's node and its segment.
     const MOST_STEPS: usize = 256;
+    /// Distance up to which a vertex counts as beside its segment, in radii: smooth curves bow out of segments.
+    const BESIDE: f32 = 3.0;
     /// Another segment counts as nearer only if it is so by more than rounding errors.
     const NEARER: f32 = 0.999;
 
     /// The segment whose axis is nearest to a point, in its radii: found from one segment to the next.
     fn nearest(&self, mut node: u32, at: Vec3) -> u32 {
+        let (_, _, share) = self.foot(node, at);
         let mut least = self.distance(node, at);
+        // A vertex beside its own segment stays there, even where another one passes near by.
+        if share > 0.0 && share < 1.0 && least < Self::BESIDE {
+            return node;
+        }
         for _ in 0..Self::MOST_STEPS {
             let parent = self.tree.parents()[node as usize];
             let siblings = if parent == NO_PARENT { &[][..] } else { self.children.of(parent as usize) };

@@ -22,6 +22,9 @@ use crate::synthesis::tree::{NodeId, VesselTree};
 use bevy_math::{Vec3, ops};
 use std::f32::consts::FRAC_PI_4;
 
+/// Length over which a lateral that leaves beside its place comes back to its centre line, as a multiple of the distance.
+const LEAN: f32 = 2.0;
+
 /// What a trunk leaves to a lateral.
 #[derive(Clone, Debug)]
 enum Hole {
@@ -232,7 +235,7 @@ impl<'a> Builder<'a> {
         let lift = exit.lift(branch, &station, wide);
         let shift = point - exit.point;
         let shift = shift - out * shift.dot(out);
-        let reach = (4.0 * shift.length()).max(2.0 * exit.radius);
+        let reach = (LEAN * shift.length()).max(2.0 * exit.radius);
         let lean = Lean { shift, from: lift, to: lift + reach };
         let begin = branch.at(lift);
         let normal = unit(begin.ahead + out).unwrap_or(begin.ahead);

@@ -1,6 +1,6 @@
 //! Closed meshes of vessel trees.
 //!
-//! In: a [`VesselTree`] and [`SurfaceSettings`]. Out: a [`Surface`]: one closed, smooth [`SurfaceMesh`] for each tree,
+//! In: a [`VesselTree`](crate::synthesis::tree::VesselTree) and [`SurfaceSettings`]. Out: a [`Surface`]: one closed, smooth [`SurfaceMesh`] for each tree,
 //! whose tubes are joined without a gap, and a [`SurfaceReport`] of what could not be done as wished.
 //!
 //! The tree is taken apart into trunks, each a curve through its nodes. Rings of vertices along the curves make a cage of
