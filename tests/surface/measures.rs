@@ -16,6 +16,7 @@ pub fn sound_surface(name: &str, tree: &VesselTree, settings: &SurfaceSettings) 
     let roots = tree.roots().count();
     assert_eq!((closure.euler(), closure.components), (2 * roots as i64, roots), "{name}: {closure:?}");
     assert_eq!(closure.vertices, mesh.unique(), "{name}: vertices without a face");
+    assert_eq!(closure.degenerate_faces, 0, "{name}: faces without area");
     let unit = |vector: Vec3| (vector.length() - 1.0).abs() < 1e-3;
     assert!(mesh.positions.iter().all(|position| position.is_finite()), "{name}: positions");
     assert!(mesh.normals.iter().all(|normal| unit(*normal)), "{name}: normals");
