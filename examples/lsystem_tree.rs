@@ -32,7 +32,7 @@ use scene::{
     photo::{Shot, Shots},
     studio::{StatusLine, StudioArgs, StudioPlugin, View, front_view, moved, to_unit_size},
 };
-use vessel_mesh::{VesselMeshes, faces};
+use vessel_mesh::VesselMeshes;
 
 const HELP: &str = "1 2 3  stem, binary, monopodial\nup down  generations";
 const MORE_HELP: &str = "W  edges of the cage";
@@ -134,7 +134,7 @@ fn show(
         let mesh = Surface::new(&tree, &settings)?.mesh;
         let aside = Vec3::X * MOST.x * (level as f32 - 1.0);
         let place = Transform::from_translation(shrink * fit.translation + aside).with_scale(shrink * fit.scale);
-        let mut faces = faces(&mesh);
+        let mut faces = Mesh::from(&mesh);
         if level == 0 {
             faces = faces.with_duplicated_vertices().with_computed_flat_normals();
         }

@@ -38,7 +38,7 @@ use scene::{
     studio::{StudioArgs, StudioPlugin, View, front_view, moved, to_unit_size},
 };
 use std::{error::Error, path::PathBuf, sync::Arc};
-use vessel_mesh::{VesselMeshes, faces};
+use vessel_mesh::VesselMeshes;
 
 /// Size of each tree, for two of them to fit into the view.
 const SIZE: f32 = 0.9;
@@ -117,7 +117,7 @@ fn spawn_both(mut commands: Commands, scene: Res<Scene>, mut meshes: VesselMeshe
     let vessels = Vessels::from_tree(VesselKind::Artery, &scene.tree, &[]);
     commands.spawn((ChildOf(organ), VesselsOf(organ), vessels));
     let edges = (meshes.edges(&scene.mesh), Edges, Visibility::Hidden);
-    commands.spawn((place(0.5), meshes.tissue(faces(&scene.mesh), BLOOD))).with_child(edges);
+    commands.spawn((place(0.5), meshes.tissue(Mesh::from(&scene.mesh), BLOOD))).with_child(edges);
     // From afar, so that both are seen from the same side.
     let view = moved(&front_view(), &Transform::from_scale(Vec3::splat(1.75)));
     shots.0.push(Shot { file: "surface.png", view, field_of_view: 28.0, endoscope: false });
@@ -134,7 +134,7 @@ fn spawn_close_ups(mut commands: Commands, scene: Res<Scene>, mut meshes: Vessel
         let Some(Sight { center, radius, from }) = sight else { continue };
         let (target, scale) = (1e3 * at as f32 * Vec3::X, 1.0 / (Sight::DISTANCE * radius));
         let place = Transform::from_translation(target - scale * center).with_scale(Vec3::splat(scale));
-        commands.spawn((place, meshes.tissue(faces(&scene.mesh), BLOOD))).with_child(meshes.edges(&scene.mesh));
+        commands.spawn((place, meshes.tissue(Mesh::from(&scene.mesh), BLOOD))).with_child(meshes.edges(&scene.mesh));
         let view = Viewpoint { eye: target + from, target, up: from.any_orthonormal_vector() };
         shots.0.push(Shot { file, view, field_of_view: 45.0, endoscope: false });
     }

@@ -1,4 +1,4 @@
-//! Closed meshes of vessels as Bevy's: their faces, and the net of their edges.
+//! Closed meshes of vessels in examples: their faces, and the net of their edges.
 
 use crate::scene::light::moist_tissue;
 use bevy::{
@@ -37,15 +37,6 @@ impl VesselMeshes<'_> {
         let handle = self.materials.as_mut().map(|materials| materials.add(material));
         MeshMaterial3d(handle.unwrap_or_default())
     }
-}
-
-/// The faces, smooth.
-pub fn faces(mesh: &SurfaceMesh) -> Mesh {
-    let indices: Vec<u32> = mesh.triangles().flatten().collect();
-    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
-        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, mesh.positions.clone())
-        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, mesh.normals.clone())
-        .with_inserted_indices(Indices::U32(indices))
 }
 
 fn edges(mesh: &SurfaceMesh) -> Mesh {

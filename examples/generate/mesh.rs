@@ -4,7 +4,7 @@ use super::{Format, Job};
 use bevy_vessels::synthesis::{
     growth::Growth,
     io::{SurfaceOptions, SurfacePart, WriteError, save_surface},
-    mesh::{TriangleMesh, self_intersections},
+    mesh::TriangleMesh,
     segment_index::{SegmentIndex, overlaps},
     surface::{Surface, SurfaceError, SurfaceReport},
     tree::{ByKind, VesselTree},
@@ -89,17 +89,15 @@ impl MeshFigures {
     /// Measures a mesh.
     pub fn of(Meshed { tree, surface, ms }: &Meshed) -> Self {
         let mesh = &surface.mesh;
+        let check = mesh.validate();
+        let closure = check.closure;
         let triangles: Vec<[u32; 3]> = mesh.closed_triangles().collect();
-        let closure = mesh.closure();
-        let mut intersecting: Vec<u32> = self_intersections(&mesh.positions, &triangles).concat();
-        intersecting.sort_unstable();
-        intersecting.dedup();
         Self {
             triangles: triangles.len(),
             vertices: mesh.unique(),
             closed: closure.is_closed() && closure.is_oriented() && closure.is_manifold(),
             euler: closure.euler(),
-            self_intersections: intersecting.len(),
+            self_intersections: check.intersecting_triangles(),
             input_overlaps: overlaps(tree, &SegmentIndex::new(tree)).len(),
             volume: TriangleMesh::new(mesh.positions.clone(), triangles, None).map_or(0.0, |mesh| mesh.signed_volume()),
             mesh_ms: *ms,

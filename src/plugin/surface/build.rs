@@ -107,7 +107,7 @@ pub(super) async fn build(source: Source, pace: Pace) -> Result<(Built, Vec<Mesh
         built.push(BuiltLevel { surface: Arc::new(surface), skin });
         pace.rest(1.0).await;
     }
-    let widest = tree.radii().iter().copied().fold(0.0, f32::max);
+    let widest = tree.widest_radius();
     // One box for all levels, so that each is seen as far to the side as the others.
     let vertices = || built.iter().flat_map(|level| level.surface.mesh.positions.iter().copied());
     let origin = Vec3::from(box_around(vertices(), Vec3::ZERO, 0.0).center);

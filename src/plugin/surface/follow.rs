@@ -62,12 +62,12 @@ fn bend(
     handles: &[Handle<Mesh>],
     meshes: &mut Assets<Mesh>,
 ) -> Option<Aabb> {
-    let (nodes, origin) = (built.nodes(tree, scratch).to_vec(), built.origin);
+    let (nodes, origin) = (built.nodes(tree, scratch), built.origin);
     let mut bounds = None::<Bounds>;
     for (level, handle) in handles.iter().enumerate() {
         let skin = built.levels.get_mut(level).and_then(|level| level.skin.as_mut());
         // A skin of another tree has been refused when it was made.
-        let Some(Ok(vertices)) = skin.map(|skin| skin.follow(&nodes)) else { continue };
+        let Some(Ok(vertices)) = skin.map(|skin| skin.follow(nodes)) else { continue };
         if let Some(mut mesh) = meshes.get_mut(handle) {
             write_vertices(&mut mesh, origin, vertices.iter().copied());
         }

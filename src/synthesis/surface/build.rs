@@ -36,8 +36,7 @@ impl Surface {
     /// Those of [`new`](Self::new).
     pub async fn new_paced(tree: &VesselTree, settings: &SurfaceSettings, pace: &Pace) -> Result<Self, SurfaceError> {
         settings.validate()?;
-        let widest = tree.radii().iter().copied().fold(0.0, f32::max);
-        let shape = Shape::new(settings, widest);
+        let shape = Shape::new(settings, tree.widest_radius());
         // Coordinates from the middle of the tree: rounding doesn't depend on where the organ lies.
         let origin = middle(tree.positions());
         let (cage, report) = Builder::new(tree, &shape, settings.tips, origin).build_paced(&pace.part(0.0..0.3)).await;

@@ -60,11 +60,7 @@ impl<'a> Builder<'a> {
     pub fn new(tree: &VesselTree, shape: &'a Shape, tips: TipCap, origin: Vec3) -> Self {
         let trunks = Trunks::of(tree);
         let curves = (0..trunks.len())
-            .map(|trunk| {
-                let mut curve = Curve::default();
-                curve.set(tree, trunks.nodes(trunk), trunks.base(trunk) != Base::Root, origin);
-                curve
-            })
+            .map(|trunk| Curve::of(tree, trunks.nodes(trunk), trunks.base(trunk) != Base::Root, origin))
             .collect();
         let holes = vec![None; trunks.len()];
         let cage = Cage { starts: vec![0], ..Cage::default() };

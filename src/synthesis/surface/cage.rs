@@ -29,7 +29,7 @@ impl Vertices {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cage {
     pub vertices: Vertices,
-    /// For each face, its first corner; and the number of corners.
+    /// First corner of each face, and at the end the number of corners.
     pub starts: Vec<u32>,
     /// Vertex of each corner, anticlockwise around each face seen from outside.
     pub corners: Vec<u32>,
@@ -65,9 +65,7 @@ impl Cage {
         self.vertices.nodes.truncate(count as usize);
         self.corners.iter_mut().for_each(|corner| *corner = numbers[*corner as usize]);
     }
-}
 
-impl Cage {
     /// Faces between two rings, by columns of the ring with more sides.
     pub fn belt(&mut self, rings: &[Ring], bases: &[u32], is_open: impl Fn(u32, u32) -> bool) {
         let [low, high] = [&rings[0], &rings[1]];

@@ -32,8 +32,7 @@ impl Surface {
         settings.validate()?;
         let settings = SurfaceSettings { level: 0, ..settings.clone() };
         let mut surface = Self::new_paced(tree, &settings, &pace.part(0.0..0.8)).await?;
-        let widest = tree.radii().iter().copied().fold(0.0, f32::max);
-        let (shape, mesh) = (Shape::new(&settings, widest), &mut surface.mesh);
+        let (shape, mesh) = (Shape::new(&settings, tree.widest_radius()), &mut surface.mesh);
         let draw_in = |vertex: usize| {
             let radius = mesh.radii[vertex];
             let sides = shape.sides_of(radius);

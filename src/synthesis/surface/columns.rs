@@ -121,6 +121,11 @@ impl Columns {
         Self { angles }
     }
 
+    /// Adds the angles of a ring with so many sides to a list.
+    pub fn sample(&self, sides: u32, angles: &mut Vec<f32>) {
+        angles.extend((0..sides).map(|line| self.at(line as f32 / sides as f32)));
+    }
+
     /// Adds the angles of a ring with so many sides to a list, at a share of the way from these columns to others.
     pub fn blend(&self, other: &Self, share: f32, sides: u32, angles: &mut Vec<f32>) {
         angles.extend((0..sides).map(|line| {

@@ -6,7 +6,7 @@
 
 use super::direction::{across, turn, unit};
 use crate::synthesis::{
-    segment_index::MAX_FLARE,
+    segment_index::start_radius,
     tree::{NO_PARENT, VesselTree},
 };
 use bevy_math::Vec3;
@@ -83,53 +83,40 @@ pub(super) struct Lean {
 pub(super) struct Curve {
     knots: Vec<Knot>,
     marks: Vec<Mark>,
-    eased: Vec<Knot>,
     lean: Lean,
 }
 
 impl Curve {
-    /// Makes this the curve of a trunk. `origin` is subtracted from positions.
+    /// The curve of a trunk. `origin` is subtracted from positions.
     ///
     /// `is_lateral`: the first node is another trunk's, and has that one's radius.
-    pub fn set(&mut self, tree: &VesselTree, nodes: &[u32], is_lateral: bool, origin: Vec3) {
-        self.lean = Lean::default();
-        self.set_marks(tree, nodes, is_lateral);
-        self.keep_nodes(tree, nodes, origin);
-        self.ease_long_segments();
-        self.set_directions();
-        self.set_lengths();
-        let mut before: Option<Knot> = None;
-        for knot in self.knots.iter().filter(|knot| !knot.is_between) {
-            if let Some(before) = before {
-                let places = before.place as usize..=knot.place as usize;
-                spread(&mut self.marks[places], before.length, knot.length);
-            }
-            before = Some(*knot);
-        }
-        // A tip that coincides with the knot before it.
-        let beyond = self.knots.last().map_or(0, |knot| knot.place as usize);
-        let length = self.length();
-        self.marks[beyond..].iter_mut().for_each(|mark| mark.length = length);
+    pub fn of(tree: &VesselTree, nodes: &[u32], is_lateral: bool, origin: Vec3) -> Self {
+        let mut curve = Self::default();
+        curve.set_marks(tree, nodes, is_lateral);
+        curve.keep_nodes(tree, nodes, origin);
+        curve.ease_long_segments();
+        curve.set_directions();
+        curve.set_lengths();
+        curve.set_mark_lengths();
+        curve
     }
 
     /// Lengths of the nodes along the chords, and radii.
     fn set_marks(&mut self, tree: &VesselTree, nodes: &[u32], is_lateral: bool) {
-        self.marks.clear();
         let mut length = 0.0;
         for (place, &node) in nodes.iter().enumerate() {
             let radius = tree.radii()[node as usize];
             let before = place.checked_sub(1).map(|before| nodes[before] as usize);
-            let (mut end_radius, mut start_radius) = (radius, radius);
+            let (mut end_radius, mut from_radius) = (radius, radius);
             if let Some(before) = before {
                 length += tree.positions()[node as usize].distance(tree.positions()[before]);
                 // A trunk through a root runs against the tree's order up to the root.
                 let runs_back = tree.parents()[before] == node;
-                let thin = if runs_back { tree.radii()[before] } else { radius };
-                let wide = if runs_back { radius } else { tree.radii()[before] };
-                let flared = wide.min(MAX_FLARE * thin);
-                (start_radius, end_radius) = if runs_back { (thin, flared) } else { (flared, thin) };
+                let child = if runs_back { before } else { node as usize };
+                let (thin, flared) = (tree.radii()[child], start_radius(tree, child));
+                (from_radius, end_radius) = if runs_back { (thin, flared) } else { (flared, thin) };
             }
-            self.marks.push(Mark { chords: length, length: 0.0, end_radius, start_radius });
+            self.marks.push(Mark { chords: length, length: 0.0, end_radius, start_radius: from_radius });
         }
         // A vessel begins as its first segment does.
         let begins = is_lateral || tree.parents()[nodes[0] as usize] == NO_PARENT;
@@ -150,7 +137,6 @@ impl Curve {
             place: place as u32,
             is_between: false,
         };
-        self.knots.clear();
         self.knots.push(knot(0));
         let last = nodes.len() - 1;
         for place in 1..last {
@@ -169,21 +155,21 @@ impl Curve {
 
     /// Keeps long segments straight but near their ends: a spline from node to node would bow out of them.
     fn ease_long_segments(&mut self) {
-        self.eased.clear();
+        let mut eased = Vec::with_capacity(self.knots.len());
         for pair in self.knots.windows(2) {
             let [a, b] = [pair[0], pair[1]];
             let chord = b.center - a.center;
             let reach = EASE * self.marks[b.place as usize].end_radius;
             let length = chord.length();
-            self.eased.push(a);
+            eased.push(a);
             if length > 3.0 * reach {
                 let share = reach / length;
                 let between = |share: f32| Knot { center: a.center + chord * share, is_between: true, ..a };
-                self.eased.extend([between(share), between(1.0 - share)]);
+                eased.extend([between(share), between(1.0 - share)]);
             }
         }
-        self.eased.extend(self.knots.last());
-        std::mem::swap(&mut self.knots, &mut self.eased);
+        eased.extend(self.knots.last());
+        self.knots = eased;
     }
 
     /// Tangents, weighted so that they are those of a circle through three knots; frames by the least rotation.
@@ -253,6 +239,22 @@ impl Curve {
             self.knots[knot].length = length;
             self.knots[knot].turned = turned;
         }
+    }
+
+    /// Lengths of the curve at the nodes.
+    fn set_mark_lengths(&mut self) {
+        let mut before: Option<&Knot> = None;
+        for knot in self.knots.iter().filter(|knot| !knot.is_between) {
+            if let Some(before) = before {
+                let places = before.place as usize..=knot.place as usize;
+                spread(&mut self.marks[places], before.length, knot.length);
+            }
+            before = Some(knot);
+        }
+        // A tip that coincides with the knot before it.
+        let beyond = self.knots.last().map_or(0, |knot| knot.place as usize);
+        let length = self.length();
+        self.marks[beyond..].iter_mut().for_each(|mark| mark.length = length);
     }
 
     /// How far the radius at a knot is from the mean of its neighbours', as a share. Only knots near each other count:
@@ -331,16 +333,8 @@ impl Curve {
     pub fn at(&self, length: f32) -> Station {
         let radius = self.radius_at(length);
         let mut station = match self.span(length) {
-            None => {
-                let only = self.knots[0];
-                Station {
-                    center: only.center + only.ahead * (length - only.length),
-                    ahead: only.ahead,
-                    right: only.right,
-                    radius,
-                }
-            }
-            Some((first, second)) => self.between(&self.knots[first], &self.knots[second], length, radius),
+            None => self.knots[0].straight_on(length, radius),
+            Some((first, second)) => between(&self.knots[first], &self.knots[second], length, radius),
         };
         let Lean { shift, from, to } = self.lean;
         if length < to {
@@ -349,31 +343,30 @@ impl Curve {
         }
         station
     }
+}
 
-    fn between(&self, a: &Knot, b: &Knot, length: f32, radius: f32) -> Station {
-        if length <= a.length {
-            return Station {
-                center: a.center + a.ahead * (length - a.length),
-                ahead: a.ahead,
-                right: a.right,
-                radius,
-            };
-        }
-        if length >= b.length {
-            return Station {
-                center: b.center + b.ahead * (length - b.length),
-                ahead: b.ahead,
-                right: b.right,
-                radius,
-            };
-        }
-        let share = (length - a.length) / (b.length - a.length);
-        let chord = a.center.distance(b.center);
-        let (center, velocity) = hermite(a, b, chord, share);
-        let ahead = unit(velocity).unwrap_or(a.ahead);
-        let right = across(turn(a.ahead, ahead) * a.right, ahead);
-        Station { center, ahead, right, radius }
+impl Knot {
+    /// The station on the straight line through the knot.
+    fn straight_on(&self, length: f32, radius: f32) -> Station {
+        let Self { center, ahead, right, .. } = *self;
+        Station { center: center + ahead * (length - self.length), ahead, right, radius }
     }
+}
+
+/// The station between two knots, or straight on beyond them.
+fn between(a: &Knot, b: &Knot, length: f32, radius: f32) -> Station {
+    if length <= a.length {
+        return a.straight_on(length, radius);
+    }
+    if length >= b.length {
+        return b.straight_on(length, radius);
+    }
+    let share = (length - a.length) / (b.length - a.length);
+    let chord = a.center.distance(b.center);
+    let (center, velocity) = hermite(a, b, chord, share);
+    let ahead = unit(velocity).unwrap_or(a.ahead);
+    let right = across(turn(a.ahead, ahead) * a.right, ahead);
+    Station { center, ahead, right, radius }
 }
 
 /// Lengths of marks between two knots, in proportion to those along the chords.

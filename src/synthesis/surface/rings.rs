@@ -84,12 +84,11 @@ impl Rings {
     pub fn lay(&mut self, curve: &Curve, start: &Start, rows: &mut [Row], shape: &Shape) {
         self.rings.clear();
         self.angles.clear();
-        self.of_rows.clear();
         self.push(curve, start.length, start.sides, None);
         if start.normal != Vec3::ZERO {
             self.rings[0].normal = start.normal;
         }
-        start.columns.blend(&start.columns, 0.0, start.sides, &mut self.angles);
+        start.columns.sample(start.sides, &mut self.angles);
         let (mut columns, mut before) = (start.columns.clone(), start.length);
         for (number, row) in (0u32..).zip(rows) {
             let station = curve.at(row.length);
@@ -100,10 +99,12 @@ impl Rings {
             for line in 0..=row.width {
                 let length = first + 2.0 * row.half * line as f32 / row.width as f32;
                 self.push(curve, length, row.sides, Some(number));
-                let ring = self.rings.len() - 1;
-                self.rings[ring].normal = station.ahead;
-                self.rings[ring].station.radius = self.rings[ring].station.radius.max(station.radius);
-                next.blend(&next, 0.0, row.sides, &mut self.angles);
+                if let Some(ring) = self.rings.last_mut() {
+                    ring.normal = station.ahead;
+                    ring.station.radius = ring.station.radius.max(station.radius);
+                    ring.radius = ring.station.radius;
+                }
+                next.sample(row.sides, &mut self.angles);
             }
             (columns, before) = (next, row.length + row.half);
         }
@@ -124,7 +125,7 @@ impl Rings {
         let last = self.rings.len() - 1;
         let sides = sides.clamp(self.rings[last].sides / 2, self.rings[last].sides * 2).max(4);
         self.push(curve, tip, sides, None);
-        even.blend(&even, 0.0, sides, &mut self.angles);
+        even.sample(sides, &mut self.angles);
     }
 
     fn push(&mut self, curve: &Curve, length: f32, sides: u32, row: Option<u32>) {
@@ -213,9 +214,6 @@ impl Rings {
     /// In the limit, the surface at a ring is a mean of that ring, four times, and of its neighbours: it cuts corners and
     /// flattens bulges. The rings are moved by as much to the other side.
     fn swell(&mut self) {
-        for ring in &mut self.rings {
-            ring.radius = ring.station.radius;
-        }
         let mut before = self.rings[0].station.center;
         for index in 1..self.rings.len().saturating_sub(1) {
             let [a, b, c] = [index - 1, index, index + 1].map(|ring| self.rings[ring]);

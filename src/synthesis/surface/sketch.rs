@@ -31,7 +31,7 @@ impl Surface {
     pub async fn sketch_paced(tree: &VesselTree, pace: &Pace) -> Self {
         let mut is_tip = vec![true; tree.len()];
         tree.segments().for_each(|(_, parent)| is_tip[parent] = false);
-        let widest = tree.radii().iter().copied().fold(0.0, f32::max);
+        let widest = tree.widest_radius();
         let mut sketch = Sketch { tree, is_tip, widest, mesh: SurfaceMesh::default() };
         let branches = tree.branches();
         let add = |stretch: std::ops::Range<usize>| stretch.for_each(|branch| sketch.add(branches.nodes(branch)));

@@ -114,6 +114,11 @@ impl VesselTree {
         &self.radii
     }
 
+    /// The largest radius, in tissue lengths; 0 for an empty tree.
+    pub fn widest_radius(&self) -> f32 {
+        self.radii.iter().copied().fold(0.0, f32::max)
+    }
+
     /// The parent of a node, `None` for a root.
     ///
     /// # Panics
