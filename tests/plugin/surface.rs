@@ -10,7 +10,7 @@ use bevy_vessels::{
         SurfaceShown, VesselAppearance, VesselMesh, VesselSurface, triangle_mesh,
     },
     synthesis::{
-        io::{SurfaceOptions, load_mesh},
+        io::{SurfaceOptions, SurfacePart, load_mesh},
         surface::SurfaceSettings,
     },
 };
@@ -384,4 +384,15 @@ fn what_cannot_be_saved_is_told() {
     assert!(matches!(errors_of(empty)[..], [SurfaceSaveError::NoVessels]));
     assert!(matches!(errors_of(blank)[..], [SurfaceSaveError::NoVessels]));
     assert!(matches!(errors_of(organ)[..], [SurfaceSaveError::Write(_), SurfaceSaveError::Write(_)]), "{told:?}");
+}
+
+#[test]
+fn files_have_the_colours_in_which_vessels_are_drawn() {
+    for kind in VesselKind::ALL {
+        let drawn = VesselAppearance::DEFAULT_COLORS[kind].to_linear();
+        let written = SurfacePart::DEFAULT_COLORS[kind];
+        for (a, b) in [drawn.red, drawn.green, drawn.blue].into_iter().zip(written) {
+            assert!((a - b).abs() < 1e-5, "{kind:?}: {drawn:?} is drawn, {written:?} written");
+        }
+    }
 }
