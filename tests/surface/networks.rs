@@ -46,20 +46,26 @@ fn a_thousand_networks_have_closed_surfaces() {
     });
 }
 
-/// The published share of bifurcations without a defect is 83 % at best; here it is the share of nodes.
+/// The published share of bifurcations without a defect is 83 % at best. Here, of nodes, it is above 99.9 %.
 #[test]
 fn hardly_a_face_of_a_grown_network_meets_another() {
-    let (mut faces, mut meeting) = (0, 0);
+    let (mut faces, mut meeting, mut sound, mut remade, mut left) = (0, 0, 0, 0, 0);
     for seed in 0..70 {
         for tree in grow(seed) {
-            let mesh = sound_surface(&format!("seed {seed}"), &tree, &SurfaceSettings::default()).mesh;
+            let Surface { mesh, report } = sound_surface(&format!("seed {seed}"), &tree, &SurfaceSettings::default());
             let check = mesh.validate();
             faces += mesh.triangle_count();
             meeting += check.intersecting_triangles();
+            sound += u32::from(check.is_sound());
+            remade += report.remade.len();
+            left += report.left.len();
         }
     }
-    println!("{meeting} of {faces} triangles meet others");
-    assert!((meeting as f64) < 5e-4 * faces as f64, "{meeting} of {faces}");
+    println!(
+        "{meeting} of {faces} triangles meet others; {sound} of 140 networks are sound; {remade} joints made again, {left} left"
+    );
+    assert!((meeting as f64) < 3e-4 * faces as f64, "{meeting} of {faces}");
+    assert!(sound >= 130 && remade > 5 && left < 16, "{sound} are sound, {remade} joints made again, {left} left");
 }
 
 #[test]

@@ -286,3 +286,24 @@ fn settings_out_of_their_limits_are_refused() {
     let message = wrong(|settings| settings.most_sides = 128).to_string();
     assert!(message.contains("128") && message.contains("set 4, 8, 16, 32 or 64"), "{message}");
 }
+
+/// A twig that leaves a trunk at 10° stays within it for long, and beside it for longer.
+#[test]
+fn a_flat_lateral_is_made_from_the_outline_of_both() {
+    let aside = |length: f32| Vec3::new(0.17 * length, 0.0, 1.0 + length);
+    let nodes = [
+        (Vec3::ZERO, NO_PARENT, 0.1),
+        (Vec3::Z, 0, 0.1),
+        (Vec3::Z * 4.0, 1, 0.1),
+        (aside(1.0), 1, 0.04),
+        (aside(2.9), 3, 0.04),
+    ];
+    for level in 1..=3 {
+        let tree = tree(&nodes);
+        let settings = SurfaceSettings { level, ..SurfaceSettings::default() };
+        let surface = sound_surface("flat lateral", &tree, &settings);
+        assert!(surface.mesh.validate().is_sound(), "level {level}: {:?}", surface.report);
+        let ratio = volume(&surface.mesh) / union_volume(&tree, 200_000);
+        assert!((ratio - 1.0).abs() < 0.05, "level {level}: {ratio}");
+    }
+}

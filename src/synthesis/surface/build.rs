@@ -1,10 +1,11 @@
 //! The surface of a tree, with a report of what was done.
 
-use super::builder::Builder;
+use super::builder::{Builder, Built};
 use super::cage_mesh::as_it_is;
 use super::half_edges::HalfEdges;
 use super::limit::finish;
 use super::mesh::SurfaceMesh;
+use super::remake::{Plan, Remade, remake};
 use super::report::SurfaceReport;
 use super::settings::{SurfaceError, SurfaceSettings};
 use super::shape::Shape;
@@ -39,20 +40,27 @@ impl Surface {
         let shape = Shape::new(settings, tree.widest_radius());
         // Coordinates from the middle of the tree: rounding doesn't depend on where the organ lies.
         let origin = middle(tree.positions());
-        let (cage, report) = Builder::new(tree, &shape, settings.tips, origin).build_paced(&pace.part(0.0..0.3)).await;
+        let built = Builder::new(tree, &shape, settings.tips, origin).build_paced(&pace.part(0.0..0.3)).await;
+        let Built { cage, trunks, curves, layout, mut report } = built;
         let faces = cage.corners.len() as u64 * 4u64.pow(settings.level.saturating_sub(1));
         if 2 * faces > u64::from(u32::MAX) {
             return Err(SurfaceError::TooManyFaces { faces });
         }
         let mut half_edges = HalfEdges::of_paced(cage, &pace.part(0.3..0.4)).await;
-        let mesh = if settings.level == 0 {
+        let mut mesh = if settings.level == 0 {
             as_it_is(half_edges, origin, &pace.part(0.4..1.0)).await
         } else {
             for _ in 1..settings.level {
                 half_edges = half_edges.refined_paced(&pace.part(0.4..0.6)).await;
             }
-            finish(half_edges, origin, &pace.part(0.6..1.0)).await
+            finish(half_edges, origin, &pace.part(0.6..0.9)).await
         };
+        if settings.level > 0 && !layout.doubts.is_empty() {
+            let faces_per_corner = 4u32.pow(settings.level - 1);
+            let plan = Plan { trunks, curves, layout, origin, faces_per_corner };
+            let Remade { remade, left } = remake(&mut mesh, &plan, &pace.part(0.9..1.0)).await;
+            (report.remade, report.left) = (remade, left);
+        }
         Ok(Self { mesh, report })
     }
 }

@@ -11,8 +11,9 @@ use super::columns::Columns;
 use super::curve::{Curve, Lean};
 use super::direction::{across, unit};
 use super::exit::Exit;
+use super::layout::{Layout, Mouth, Stretch};
 use super::report::SurfaceReport;
-use super::rings::{Ring, Rings, Start};
+use super::rings::{Rings, Start};
 use super::rows::{Opening, Row, rows};
 use super::settings::TipCap;
 use super::shape::Shape;
@@ -24,6 +25,10 @@ use std::f32::consts::FRAC_PI_4;
 
 /// Length over which a lateral that leaves beside its place comes back to its centre line, as a multiple of the distance.
 const LEAN: f32 = 2.0;
+/// Length along a vessel, from a place that lacks room, within which faces are checked, in radii.
+const DOUBTFUL: f32 = 4.0;
+/// The same for a lateral that leaves so flat that it runs beside its trunk.
+const BESIDE: f32 = 24.0;
 
 /// What a trunk leaves to a lateral.
 #[derive(Clone, Debug)]
@@ -35,6 +40,9 @@ enum Hole {
         lean: Lean,
         /// The vertices around the hole, those of the lateral's first ring in their order.
         edge: Vec<u32>,
+        mouth: Mouth,
+        /// Length over which its faces may meet others.
+        doubtful: Option<f32>,
     },
     /// The lateral ends within the trunk's lumen.
     Absorbed,
@@ -52,7 +60,17 @@ pub(super) struct Builder<'a> {
     exits: Vec<Exit>,
     /// First vertex of each ring.
     bases: Vec<u32>,
+    layout: Layout,
     report: SurfaceReport,
+}
+
+/// A cage, and what it was made from.
+pub(super) struct Built {
+    pub cage: Cage,
+    pub trunks: Trunks,
+    pub curves: Vec<Curve>,
+    pub layout: Layout,
+    pub report: SurfaceReport,
 }
 
 impl<'a> Builder<'a> {
@@ -74,15 +92,17 @@ impl<'a> Builder<'a> {
             rings: Rings::default(),
             exits: Vec::new(),
             bases: Vec::new(),
+            layout: Layout::default(),
             report: SurfaceReport::default(),
         }
     }
 
     /// The whole cage, as paced work.
-    pub async fn build_paced(mut self, pace: &Pace) -> (Cage, SurfaceReport) {
+    pub async fn build_paced(mut self, pace: &Pace) -> Built {
         pace.stretches(self.trunks.len(), SHORT_STRETCH, |trunks| trunks.for_each(|trunk| self.add(trunk))).await;
         self.cage.drop_unused();
-        (self.cage, self.report)
+        let Self { cage, trunks, curves, layout, report, .. } = self;
+        Built { cage, trunks, curves, layout, report }
     }
 
     /// Adds a trunk whose base's trunk has been added.
@@ -90,16 +110,22 @@ impl<'a> Builder<'a> {
         let hole = self.holes[trunk].take();
         let (start, edge) = match hole {
             Some(Hole::Absorbed) => {
+                self.layout.begin(None, self.cage.corners.len());
                 let tip = self.trunks.nodes(trunk).last().copied();
                 self.report.absorbed.extend(tip.map(NodeId));
                 return;
             }
-            Some(Hole::Open { start, right, lean, edge }) => {
+            Some(Hole::Open { start, right, lean, edge, mouth, doubtful }) => {
+                self.layout.begin(Some(mouth), self.cage.corners.len());
                 self.curves[trunk].set_right(start.length, right);
                 self.curves[trunk].set_lean(lean);
+                if let Some(reach) = doubtful {
+                    self.doubt(trunk, start.length, lean.to.max(start.length + reach));
+                }
                 (start, Some(edge))
             }
             None => {
+                self.layout.begin(None, self.cage.corners.len());
                 let sides = self.shape.sides_of(self.curves[trunk].radius_at(0.0));
                 (Start { length: 0.0, normal: Vec3::ZERO, columns: Columns::even(sides, FRAC_PI_4), sides }, None)
             }
@@ -115,10 +141,37 @@ impl<'a> Builder<'a> {
             self.report.moved += if row.is_moved() { count } else { 0 };
         }
         self.rings.lay(curve, &start, &mut rows, self.shape);
+        for number in 0..rows.len() {
+            let row = &rows[number];
+            if let Some(reach) = self.doubtful(row, self.curves[trunk].radius_at(row.length)) {
+                self.doubt(trunk, row.length - reach, row.length + reach);
+            }
+        }
+        for ring in 0..self.rings.rings.len() {
+            let ring = self.rings.rings[ring];
+            if ring.is_doubtful {
+                let reach = DOUBTFUL * ring.station.radius;
+                self.doubt(trunk, ring.length - reach, ring.length + reach);
+            }
+        }
         self.add_rings(trunk);
         self.add_belts(&rows);
         self.add_ends(trunk, edge);
         self.open_holes(trunk, &rows);
+    }
+
+    /// Length around a row over which faces may meet others, if its openings may lack room.
+    fn doubtful(&self, row: &Row, radius: f32) -> Option<f32> {
+        let is_flat = |opening: &Opening| self.exits[opening.exit as usize].is_flat;
+        if row.openings.iter().any(is_flat) {
+            return Some(row.half + BESIDE * radius);
+        }
+        let is_crowded = row.is_shortened() || row.is_moved() || row.openings.len() > 1;
+        is_crowded.then_some(row.half + DOUBTFUL * radius)
+    }
+
+    fn doubt(&mut self, trunk: usize, from: f32, to: f32) {
+        self.layout.doubts.push(Stretch { trunk: trunk as u32, from, to });
     }
 
     /// The exits of a trunk's laterals. Laterals of one that ends within the trunk leave the trunk itself.
@@ -177,6 +230,7 @@ impl<'a> Builder<'a> {
                     is_in_line && (column + sides - opening.column) % sides < opening.width
                 })
             };
+            self.layout.push_ring(self.rings.rings[belt].length, self.cage.corners.len());
             self.cage.belt(&self.rings.rings[belt..belt + 2], &self.bases[belt..belt + 2], is_open);
         }
     }
@@ -185,25 +239,27 @@ impl<'a> Builder<'a> {
     fn add_ends(&mut self, trunk: usize, edge: Option<Vec<u32>>) {
         let (curve, nodes) = (&self.curves[trunk], self.trunks.nodes(trunk));
         let first = self.rings.rings[0];
+        let ends = self.cage.corners.len();
+        let last = self.rings.rings.len() - 1;
+        self.layout.push_ring(self.rings.rings[last].length, ends);
         match edge {
             Some(edge) => self.cage.sleeve(&edge, &first, self.bases[0]),
             None => caps::add(&mut self.cage, &first, self.bases[0], caps::End::Base, TipCap::Round, nodes[0]),
         }
-        let last = self.rings.rings.len() - 1;
         let node = nodes[curve.place_at(curve.length())];
-        let ring = self.rings.rings[last];
+        let (ring, tip) = (self.rings.rings[last], self.cage.corners.len());
         caps::add(&mut self.cage, &ring, self.bases[last], caps::End::Tip, self.tips, node);
+        self.layout.end([ends, tip, self.cage.corners.len()]);
     }
 
     /// Tells the laterals where their holes are.
     fn open_holes(&mut self, trunk: usize, rows: &[Row]) {
         for (number, row) in rows.iter().enumerate() {
             let first = self.rings.of_rows[number];
-            let ring = self.rings.rings[(first + row.width / 2) as usize];
             for opening in &row.openings {
                 let exit = self.exits[opening.exit as usize];
                 let edge = self.edge_of(first + (row.width - opening.width) / 2, opening, row.sides);
-                let hole = self.hole(trunk, &ring, row, &exit, opening, edge);
+                let hole = self.hole(trunk, [first, first + row.width], row, &exit, opening, edge);
                 self.holes[exit.lateral as usize] = Some(hole);
             }
         }
@@ -220,7 +276,8 @@ impl<'a> Builder<'a> {
         lower.chain(right).chain(upper).chain(left).collect()
     }
 
-    fn hole(&self, trunk: usize, ring: &Ring, row: &Row, exit: &Exit, opening: &Opening, edge: Vec<u32>) -> Hole {
+    fn hole(&self, trunk: usize, rings: [u32; 2], row: &Row, exit: &Exit, opening: &Opening, edge: Vec<u32>) -> Hole {
+        let ring = &self.rings.rings[((rings[0] + rings[1]) / 2) as usize];
         let station = self.curves[trunk].at(row.length);
         let branch = &self.curves[exit.lateral as usize];
         let middle =
@@ -237,6 +294,14 @@ impl<'a> Builder<'a> {
         let normal = unit(begin.ahead + out).unwrap_or(begin.ahead);
         let sides = 4 * opening.width;
         let start = Start { length: lift, normal, columns: Columns::even(sides, -3.0 * FRAC_PI_4), sides };
-        Hole::Open { start, right: station.ahead.cross(out), lean, edge }
+        let mouth = Mouth { trunk: trunk as u32, rings };
+        Hole::Open {
+            start,
+            right: station.ahead.cross(out),
+            lean,
+            edge,
+            mouth,
+            doubtful: self.doubtful(row, station.radius),
+        }
     }
 }

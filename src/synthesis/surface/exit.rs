@@ -12,6 +12,8 @@ use bevy_math::{Vec3, ops};
 const LEAST_SLOPE: f32 = 0.35;
 /// Half the edge of a square with the circumference of a circle of radius 1.
 pub(super) const HALF_EDGE: f32 = std::f32::consts::FRAC_PI_4;
+/// Length from a joint, in sums of both radii, at which trunk and lateral should be apart.
+const APART: f32 = 3.0;
 /// Height of the first ring above the trunk, in radii of the lateral.
 const CLEARANCE: f32 = 0.25;
 
@@ -30,6 +32,8 @@ pub(super) struct Exit {
     pub half: f32,
     /// Sine of the angle between trunk and lateral.
     pub slope: f32,
+    /// Whether it stays so near the trunk that their surfaces meet some way from the joint.
+    pub is_flat: bool,
 }
 
 impl Exit {
@@ -45,7 +49,13 @@ impl Exit {
         let offset = (base.center - here.center).dot(here.ahead);
         let length = (joint + offset + here.radius * cosine / slope).clamp(0.0, trunk.length());
         let point = base.center + direction * (here.radius / slope);
-        Self { lateral, length, radius, point, half: HALF_EDGE * radius / slope.max(0.5), slope }
+        let runs_beside = |side: f32| {
+            let way = APART * (here.radius + radius);
+            let beside = trunk.at(joint + side * way);
+            curve.at(way).center.distance(beside.center) < beside.radius + radius
+        };
+        let is_flat = slope <= LEAST_SLOPE || runs_beside(1.0) || runs_beside(-1.0);
+        Self { lateral, length, radius, point, half: HALF_EDGE * radius / slope.max(0.5), slope, is_flat }
     }
 
     /// Whether the lateral's centre line ends within the trunk.

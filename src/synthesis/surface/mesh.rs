@@ -52,17 +52,20 @@ impl SurfaceMesh {
 
     /// The faces as triangles; a face with four vertices is divided along its shorter diagonal.
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
-        self.faces.iter().flat_map(|&[a, b, c, d]| {
-            let [pa, pb, pc, pd] = [a, b, c, d].map(|vertex| self.positions[vertex as usize]);
-            let (first, second) = if c == d {
-                ([a, b, c], None)
-            } else if pa.distance_squared(pc) <= pb.distance_squared(pd) {
-                ([a, b, c], Some([a, c, d]))
-            } else {
-                ([a, b, d], Some([b, c, d]))
-            };
-            std::iter::once(first).chain(second)
-        })
+        self.faces.iter().flat_map(|&face| self.divided(face))
+    }
+
+    /// The triangles of a face.
+    pub(super) fn divided(&self, [a, b, c, d]: [u32; 4]) -> impl Iterator<Item = [u32; 3]> + use<> {
+        let [pa, pb, pc, pd] = [a, b, c, d].map(|vertex| self.positions[vertex as usize]);
+        let (first, second) = if c == d {
+            ([a, b, c], None)
+        } else if pa.distance_squared(pc) <= pb.distance_squared(pd) {
+            ([a, b, c], Some([a, c, d]))
+        } else {
+            ([a, b, d], Some([b, c, d]))
+        };
+        std::iter::once(first).chain(second)
     }
 
     /// The triangles, with originals in place of copies: the closed surface.

@@ -13,6 +13,12 @@ pub struct SurfaceReport {
     pub shortened: usize,
     /// Laterals whose opening lies beside the place where they leave, by more than half its length.
     pub moved: usize,
+    /// Joints whose faces would have met each other, by a node of each: their surface is the outline of the union of
+    /// their segments.
+    pub remade: Vec<NodeId>,
+    /// Joints whose faces still meet each other, by a node of each: their segments run through each other so that the
+    /// outline of their union has holes.
+    pub left: Vec<NodeId>,
     /// Last nodes of vessels that end within the lumen of the vessel that they leave. They have no faces.
     pub absorbed: Vec<NodeId>,
 }

@@ -45,6 +45,8 @@ pub(super) struct Ring {
     pub radius: f32,
     /// Its first angle in the list.
     pub first_angle: u32,
+    /// Whether a neighbour met it before it was tilted, or one beside it left out.
+    pub is_doubtful: bool,
     /// Rings of one row have one number, and a common plane. Others may be left out.
     row: Option<u32>,
 }
@@ -138,6 +140,7 @@ impl Rings {
             normal: station.ahead,
             radius: station.radius,
             first_angle,
+            is_doubtful: false,
             row,
         });
     }
@@ -197,6 +200,8 @@ impl Rings {
                     continue;
                 } else {
                     self.align(kept, index);
+                    self.rings[kept].is_doubtful = true;
+                    self.rings[index].is_doubtful = true;
                 }
                 break;
             }
