@@ -171,6 +171,7 @@ fn instances_are_shown_where_they_are() {
     let turned = shown(json!({"TRANSLATION": places, "ROTATION": turns + 1}), true).expect("a mesh");
     assert_is(&turned, 12.0, vec3(-2.0, 0.0, 0.0), vec3(12.0, 14.0, 0.0));
     assert!(shown(json!({"TRANSLATION": places, "SCALE": 0}), true).is_err(), "3 places, 4 scales");
+    assert!(shown(json!({"_COLOUR": 0}), true).is_err(), "instances without places");
     let skinned =
         json!({"nodes": [{"mesh": 0, "skin": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {}}}}]});
     assert!(message(&glb, skinned).contains("no meaning together"));

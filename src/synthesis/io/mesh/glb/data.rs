@@ -21,7 +21,7 @@ pub(super) struct Data<'a> {
     blob: Option<&'a [u8]>,
     /// That of the file; without one, no other files are read.
     folder: Option<&'a Path>,
-    buffers: Vec<OnceCell<Cow<'a, [u8]>>>,
+    buffers: Vec<OnceCell<Loaded<'a>>>,
     /// The first buffer of each file, and the length that it announces.
     files: RefCell<BTreeMap<(PathBuf, u64), u32>>,
     /// Bytes of files so far.
@@ -42,7 +42,7 @@ impl<'a> Data<'a> {
         accessor: u32,
         shape: Shape,
     ) -> Result<Elements<'_, N>, MeshDataError> {
-        let accessor = find(&self.document.accessors, accessor, "accessor")?;
+        let accessor = find(&self.document.accessors, accessor, "an accessor")?;
         if accessor.shape != shape {
             return Err(MeshDataError::content("an accessor is not of the type that its use asks for"));
         }
@@ -77,7 +77,7 @@ impl<'a> Data<'a> {
 
     /// `count` elements of `size` bytes in a view.
     fn strided(&self, view: u32, offset: u64, count: usize, size: usize) -> Result<Strided<'_>, MeshDataError> {
-        let view = find(&self.document.buffer_views, view, "buffer view")?;
+        let view = find(&self.document.buffer_views, view, "a buffer view")?;
         let buffer = self.buffer(view.buffer)?;
         let stride = view.byte_stride.map_or(0, |stride| stride as usize);
         let stride = if stride == 0 { size } else { stride };
@@ -95,32 +95,36 @@ impl<'a> Data<'a> {
 
     /// The bytes of a buffer.
     fn buffer(&self, index: u32) -> Result<&[u8], MeshDataError> {
-        let buffer = find(&self.document.buffers, index, "buffer")?;
+        let buffer = find(&self.document.buffers, index, "a buffer")?;
         let cell = &self.buffers[index as usize];
-        if let Some(bytes) = cell.get() {
-            return Ok(bytes);
-        }
-        let bytes = match buffer.uri.as_deref() {
-            None => Cow::Borrowed(self.blob.filter(|_| index == 0).ok_or_else(|| {
-                MeshDataError::content("a buffer has no data: it names no file, and the file itself holds none for it")
-            })?),
-            Some(uri) => match uri.strip_prefix("data:") {
-                Some(data) => Cow::Owned(
-                    data.split_once(";base64,")
-                        .and_then(|(_, text)| decode_base64(text))
-                        .ok_or_else(|| MeshDataError::content("the data of a buffer is not valid base64"))?,
-                ),
-                None => match self.file(index, buffer, uri)? {
-                    Found::Bytes(bytes) => Cow::Owned(bytes),
-                    Found::Same(other) => return self.buffer(other),
-                },
-            },
+        let loaded = match cell.get() {
+            Some(loaded) => loaded,
+            None => {
+                let loaded = self.load(index, buffer)?;
+                cell.get_or_init(|| loaded)
+            }
         };
-        Ok(cell.get_or_init(|| bytes))
+        match loaded {
+            Loaded::Bytes(bytes) => Ok(bytes),
+            Loaded::Same(other) => self.buffer(*other),
+        }
+    }
+
+    fn load(&self, index: u32, buffer: &Buffer) -> Result<Loaded<'a>, MeshDataError> {
+        let Some(uri) = buffer.uri.as_deref() else {
+            let blob = self.blob.filter(|_| index == 0).ok_or_else(|| {
+                MeshDataError::content("a buffer has no data: it names no file, and the file itself holds none for it")
+            });
+            return Ok(Loaded::Bytes(Cow::Borrowed(blob?)));
+        };
+        let Some(data) = uri.strip_prefix("data:") else { return self.file(index, buffer, uri) };
+        let bytes = data.split_once(";base64,").and_then(|(_, text)| decode_base64(text));
+        let bytes = bytes.ok_or_else(|| MeshDataError::content("the data of a buffer is not valid base64"))?;
+        Ok(Loaded::Bytes(Cow::Owned(bytes)))
     }
 
     /// The file of a buffer, read unless another buffer has read it.
-    fn file(&self, index: u32, buffer: &Buffer, uri: &str) -> Result<Found, MeshDataError> {
+    fn file(&self, index: u32, buffer: &Buffer, uri: &str) -> Result<Loaded<'a>, MeshDataError> {
         let folder = self.folder.ok_or_else(|| {
             MeshDataError::content(
                 "its data is in another file, which is found only where the file is read by its path",
@@ -130,19 +134,20 @@ impl<'a> Data<'a> {
         let wanted = buffer.byte_length;
         let first = *self.files.borrow_mut().entry((path.clone(), wanted)).or_insert(index);
         if first != index {
-            return Ok(Found::Same(first));
+            return Ok(Loaded::Same(first));
         }
         let left = MOST_BYTES - self.from_files.get();
         let bytes = read_start(&path, wanted.min(left)).map_err(|source| MeshDataError::Data { path, source })?;
         self.from_files.set(self.from_files.get() + bytes.len() as u64);
         self.budget.add_present(bytes.len());
-        Ok(Found::Bytes(bytes))
+        Ok(Loaded::Bytes(Cow::Owned(bytes)))
     }
 }
 
-enum Found {
-    Bytes(Vec<u8>),
-    /// The bytes are those of another buffer.
+/// What a buffer holds.
+enum Loaded<'a> {
+    Bytes(Cow<'a, [u8]>),
+    /// The same as another buffer.
     Same(u32),
 }
 

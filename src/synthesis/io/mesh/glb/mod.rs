@@ -87,7 +87,7 @@ fn instances(
         attributes.get("ROTATION").map(|&found| data.elements(found, Shape::Vec4)).transpose()?;
     let counts = [translations.as_ref(), scales.as_ref()].map(|vectors| vectors.map(Elements::count));
     let mut counts = counts.into_iter().chain([rotations.as_ref().map(Elements::count)]).flatten();
-    let count = counts.next().unwrap_or(0);
+    let count = counts.next().ok_or_else(|| MeshDataError::content("a node has instances, but not their places"))?;
     if counts.any(|other| other != count) {
         return Err(MeshDataError::content("the attributes of instances are not of one number"));
     }
@@ -110,7 +110,7 @@ fn add_mesh(
     shown: &Placed,
     motion: &Motion,
 ) -> Result<(), MeshDataError> {
-    let mesh = find(&document.meshes, shown.mesh, "mesh")?;
+    let mesh = find(&document.meshes, shown.mesh, "a mesh")?;
     if motion.leaves_nothing() {
         return Ok(());
     }

@@ -39,7 +39,7 @@ impl<'a> Joints<'a> {
 
     /// The motion that a skin gives. The transform of the mesh's own node has no part in it.
     pub(super) fn motion(&mut self, data: &Data, skin: u32) -> Result<Motion, MeshDataError> {
-        let Skin { joints, inverse_bind_matrices } = find(&self.document.skins, skin, "skin")?;
+        let Skin { joints, inverse_bind_matrices } = find(&self.document.skins, skin, "a skin")?;
         data.budget.take(joints.len(), size_of::<DAffine3>() as u64)?;
         if self.transforms.is_empty() {
             self.transforms = transforms(self.document, &data.budget)?;
@@ -50,7 +50,7 @@ impl<'a> Joints<'a> {
             return Err(MeshDataError::content("a skin has fewer matrices than joints"));
         }
         let joint = |(number, &joint): (usize, &u32)| {
-            find(&self.document.nodes, joint, "joint")?;
+            find(&self.document.nodes, joint, "a joint")?;
             let placed = self.transforms[joint as usize]
                 .ok_or_else(|| MeshDataError::content("a joint is its own ancestor; nodes must form a tree"))?;
             let inverse = inverse.as_ref().map_or(Ok(DAffine3::IDENTITY), |inverse| affine(&inverse.floats(number)))?;
@@ -107,6 +107,7 @@ impl<'a> Pose<'a> {
         if !(weights.is_empty() || weights.len() == targets.len()) {
             return Err(MeshDataError::content("a mesh does not have one weight for each of its morph targets"));
         }
+        data.budget.take(targets.len(), size_of::<f32>() as u64)?;
         for (target, &weight) in targets.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
             let Some(&moves) = target.get("POSITION") else { continue };
             let moves = data.elements(moves, Shape::Vec3)?;
@@ -166,7 +167,7 @@ impl<'a> Pose<'a> {
                 if weight == 0.0 {
                     continue;
                 }
-                let joint = find(joints, place, "joint")?;
+                let joint = find(joints, place, "a joint")?;
                 let weight = f64::from(weight);
                 sum += weight;
                 blended.matrix3 += joint.matrix3 * weight;

@@ -19,7 +19,7 @@ pub(super) struct Placed<'a> {
 /// Hidden nodes are left out, with their children.
 pub(super) fn placed_meshes<'a>(document: &'a Document, budget: &Budget) -> Result<Vec<Placed<'a>>, MeshDataError> {
     let scene = match document.scene {
-        Some(scene) => Some(find(&document.scenes, scene, "scene")?),
+        Some(scene) => Some(find(&document.scenes, scene, "a scene")?),
         None => document.scenes.first(),
     };
     let tops = scene.map_or_else(|| top_nodes(document), |scene| scene.nodes.clone());
@@ -62,7 +62,7 @@ fn walk(
     let mut pending: Vec<(u32, u32)> = tops.into_iter().rev().map(|node| (node, 0)).collect();
     let mut seen = vec![false; document.nodes.len()];
     while let Some((index, parent)) = pending.pop() {
-        let node = find(&document.nodes, index, "node")?;
+        let node = find(&document.nodes, index, "a node")?;
         if std::mem::replace(&mut seen[index as usize], true) {
             return Err(MeshDataError::content("a node is reached twice; nodes must form a tree"));
         }

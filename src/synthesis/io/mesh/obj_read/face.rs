@@ -25,7 +25,8 @@ pub(super) struct Faces {
 }
 
 impl Faces {
-    /// Adds the face with these corners, when there are so many vertices and texture coordinates.
+    /// Adds the face with these corners, when there are so many vertices and texture coordinates. A face of fewer than
+    /// three has no surface, and is left out once its indices are checked.
     pub(super) fn add<'a>(
         &mut self,
         line: usize,
@@ -48,6 +49,12 @@ impl Faces {
                 *greatest = (*greatest).max((index.map_or(0, |index| index + 1), line));
             }
             self.corners.push(Corner { vertex, uv: uv.unwrap_or(NO_UV) });
+        }
+        let start = self.faces.last().map_or(0, |&(_, end)| end as usize);
+        if self.corners.len() - start < 3 {
+            // Some programs write edges as faces of two corners.
+            self.corners.truncate(start);
+            return Ok(());
         }
         let end = u32::try_from(self.corners.len()).map_err(|_| "it has more corners than can be numbered")?;
         self.faces.push((line, end));

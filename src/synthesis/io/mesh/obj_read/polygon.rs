@@ -31,8 +31,7 @@ pub(super) struct Polygons {
 }
 
 impl Polygons {
-    /// Triangles between the corners of a polygon, by their numbers, facing as the polygon does. None if there are
-    /// fewer than three corners, as some programs write edges.
+    /// Triangles between the corners of a polygon, by their numbers, facing as the polygon does.
     pub(super) fn cut(&mut self, corners: impl Iterator<Item = DVec3>) -> Result<&[[u32; 3]], &'static str> {
         self.corners.clear();
         self.corners.extend(corners);

@@ -56,7 +56,8 @@ fn what_growth_does_not_use_does_not_decide() {
     let latin = [b"o k\xf6rper\n# \xb5m\nusemtl \xff\n", SQUARE.as_bytes()].concat();
     assert_eq!(area(latin), 1.0);
     // Edges as faces of two corners.
-    assert_eq!(area(format!("{SQUARE}f 1 2\nf 3\n")), 1.0);
+    assert_eq!(area(format!("v nan 0 0\n{SQUARE}f 2 -5\nf 3\nf\n").replace("f 1/1 2/2 3/3 4/4", "f 2 3 4 5")), 1.0);
+    assert!(read(format!("{SQUARE}f 1 9\n")).is_err(), "an edge to a vertex that is not there");
     for text in [
         SQUARE.replace("vt 0 1", "vt"),
         SQUARE.replace("vt 0 1", "vt nan 1"),
