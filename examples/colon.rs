@@ -12,8 +12,8 @@
 //! | `M` | closed meshes, or segments as while they grow |
 //! | `I` | view from inside; then ↑ and ↓ travel along the lumen |
 //!
-//! `--mesh FILE.glb` takes your own organ, in any unit. `--headless` draws to files instead of a window, which is also
-//! the behaviour without a display: `cargo run --release --example colon -- --headless --out DIR`.
+//! `--mesh FILE` takes your own organ (GLB, glTF, OBJ), in any unit. `--headless` draws to files instead of a window,
+//! which is also the behaviour without a display: `cargo run --release --example colon -- --headless --out DIR`.
 
 mod common;
 #[path = "common/endoscopy.rs"]

@@ -13,8 +13,9 @@
 //! | space | pause growth and bleeding |
 //! | `A`, `V`, `C` | arteries, veins, meaning of the colours: the last pales vessels without blood |
 //!
-//! `--mesh FILE.glb` takes your own organ, in metres. `--headless --script demo --out DIR` makes the same cut, clamp
-//! and cautery on any machine and writes pictures and `blood_loss.csv`. This is also the behaviour without a display.
+//! `--mesh FILE` takes your own organ (GLB, glTF, OBJ), in metres. `--headless --script demo --out DIR` makes the same
+//! cut, clamp and cautery on any machine and writes pictures and `blood_loss.csv`. This is also the behaviour without a
+//! display.
 
 #[path = "common/blood.rs"]
 mod blood;

@@ -93,7 +93,7 @@ fn an_organ_is_the_same_whatever_count_shard_and_threads() {
 fn a_line_has_the_fields_that_scripts_read() {
     let text = output(&["--json", "--tissue=box"]).expect("an organ");
     // In this order, which the parsed object does not keep.
-    let keys = ["tissue", "preset", "seed", "steps", "grow_ms", "hash", "arterial", "venous", "files"];
+    let keys = ["tissue", "preset", "extent", "seed", "steps", "grow_ms", "hash", "arterial", "venous", "files"];
     let mut at = 0;
     for key in keys {
         at += text[at..].find(&format!("\"{key}\":")).unwrap_or_else(|| panic!("{key} is missing or out of place"));
@@ -221,6 +221,29 @@ fn an_organs_mesh_grows_on_its_surface_in_its_volume_and_in_stages() {
     hashes.sort();
     hashes.dedup();
     assert_eq!(hashes.len(), 9);
+}
+
+#[test]
+fn the_extent_says_what_a_file_became() {
+    let folder = Folder::new("extent");
+    let path = tetrahedron(&folder);
+    // Three faces of 4.5 and one with edges of 3 √2; a sixth of 3³.
+    let area = 13.5 + 4.5 * 3f64.sqrt();
+    for (tissue, mode, kind, value) in [
+        ("disc", None, "area", std::f64::consts::PI / 4.0),
+        ("box", None, "volume", 1.0),
+        (&path[..], Some("--mode=surface"), "area", area),
+        (&path[..], Some("--mode=volume"), "volume", 4.5),
+    ] {
+        let arguments: Vec<&str> = ["--tissue", tissue].into_iter().chain(mode).collect();
+        let [line] = generate(&arguments).try_into().expect("one organ");
+        let extent = line["extent"].as_object().expect("an object");
+        assert_eq!((&extent["kind"], extent.len()), (&kind.into(), 2), "{tissue}");
+        let found = extent["value"].as_f64().expect("a number");
+        // Volumes of meshes are those of their voxels.
+        let error = if mode == Some("--mode=volume") { 0.05 } else { 1e-5 };
+        assert!((found / value - 1.0).abs() < error, "{tissue}: {found} instead of {value}");
+    }
 }
 
 /// A ball around the origin, as an OBJ file.

@@ -4,7 +4,7 @@
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    io::read_glb,
+    io::load_mesh,
     mesh::TriangleMesh,
     random::Stream,
     tissue::{Extent, MeshSurface, MeshVolume, Tissue},
@@ -45,7 +45,7 @@ fn folder() -> Option<PathBuf> {
 }
 
 fn read(folder: &Path, name: &str) -> Result<TriangleMesh, Box<dyn std::error::Error>> {
-    Ok(read_glb(&folder.join(name).with_extension("glb"))?)
+    Ok(load_mesh(&folder.join(name).with_extension("glb"))?)
 }
 
 /// The shortest time of several runs, in ms, and the last result.
@@ -167,7 +167,7 @@ fn damaged_organs_are_errors() -> Outcome {
     let path = std::env::temp_dir().join(format!("bevy_vessels_damaged_{}.glb", std::process::id()));
     for end in [0, 3, 12, 19, 20, 400, bytes.len() / 2, bytes.len() - 1] {
         std::fs::write(&path, &bytes[..end])?;
-        let message = read_glb(&path).err().map(|error| error.to_string()).unwrap_or_default();
+        let message = load_mesh(&path).err().map(|error| error.to_string()).unwrap_or_default();
         assert!(message.contains("bevy_vessels_damaged"), "{end} bytes gave {message:?}");
     }
     std::fs::remove_file(&path)?;

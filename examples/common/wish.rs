@@ -12,7 +12,7 @@ pub struct OrganArgs {
     /// Arguments of the studio.
     #[command(flatten)]
     pub studio: StudioArgs,
-    /// Use the organ in this glTF file instead of a procedural colon.
+    /// Use the organ in this GLB, glTF or OBJ file instead of a procedural colon.
     #[arg(long)]
     pub mesh: Option<PathBuf>,
     /// Seed of a procedural organ and of its network.

@@ -49,6 +49,7 @@ impl<'a> Grower<'a> {
         Ok(Line {
             tissue: self.job.tissue_name.clone(),
             preset: self.job.preset_name.clone(),
+            extent: self.job.tissue.extent().into(),
             seed,
             steps: growth.progress().done,
             grow_ms: (grow_ms * 1e3).round() / 1e3,

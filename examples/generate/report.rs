@@ -5,7 +5,7 @@ use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     growth::{GrownTree, Growth},
     random::Stream,
-    tissue::Tissue,
+    tissue::{Extent, Tissue},
     tree::{ByKind, statistics},
 };
 use serde::{Serialize, Serializer};
@@ -20,6 +20,8 @@ pub struct Line {
     pub tissue: String,
     /// Name of the preset, or of the settings file without its extension.
     pub preset: String,
+    /// The size of the tissue.
+    pub extent: Size,
     /// The organ's seed.
     pub seed: u64,
     /// Growth steps taken.
@@ -33,6 +35,26 @@ pub struct Line {
     pub kinds: KindMeasures,
     /// Written files.
     pub files: Vec<String>,
+}
+
+/// The size of a tissue: what a file became, so that a wrong unit or a missing part is seen.
+#[derive(Debug, Serialize)]
+pub struct Size {
+    /// `length`, `area` or `volume`.
+    kind: &'static str,
+    /// In tissue lengths, square or cubic tissue lengths.
+    value: f32,
+}
+
+impl From<Extent> for Size {
+    fn from(extent: Extent) -> Self {
+        let (kind, value) = match extent {
+            Extent::Length(value) => ("length", value),
+            Extent::Area(value) => ("area", value),
+            Extent::Volume(value) => ("volume", value),
+        };
+        Self { kind, value }
+    }
 }
 
 impl Line {

@@ -22,7 +22,7 @@ const PURE_CRATES: &[&str] = &[
     "serde",
     "ron",
     "gltf",
-    "tobj",
+    "earcut",
 ];
 
 /// Modules of std that the pure half must not use: clocks, threads, the environment, the network.

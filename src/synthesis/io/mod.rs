@@ -5,6 +5,10 @@
 //! Every format has a function that writes to any [`std::io::Write`], such as [`write_swc`], and one that writes a
 //! file, such as [`save_swc`]. Files are written whole or not at all, by [`write_atomically`].
 //!
+//! What is read has a function that takes bytes, such as [`read_swc`], and one that takes a path, such as [`load_swc`].
+//! Files may come from anywhere: what a reader takes follows from the file's size, only regular files are read, and
+//! errors name places, extensions and missing files, but repeat nothing else that a file holds.
+//!
 //! ```
 //! use bevy_vessels::synthesis::{
 //!     io::{SwcOptions, SwcReadOptions, load_swc, save_swc},
@@ -26,13 +30,15 @@
 //! so the same tree gives the same bytes everywhere.
 
 mod atomic;
+mod lines;
 mod mesh;
+mod regular_file;
 mod surface;
 mod tree;
 
 pub use atomic::{WriteError, write_atomically};
 #[cfg(feature = "mesh_files")]
-pub use mesh::{MeshReadError, load_mesh, read_glb, read_obj_mesh};
+pub use mesh::{MeshDataError, MeshReadError, load_mesh, read_glb, read_obj_mesh};
 pub use mesh::{ObjOptions, save_obj, write_obj};
 pub use surface::{
     SurfaceFormat, SurfaceOptions, SurfacePart, save_surface, save_surface_obj, save_surface_off, save_surface_ply,

@@ -18,4 +18,4 @@ pub use obj::{ObjOptions, save_obj, write_obj};
 #[cfg(feature = "mesh_files")]
 pub use obj_read::read_obj_mesh;
 #[cfg(feature = "mesh_files")]
-pub use read::MeshReadError;
+pub use read::{MeshDataError, MeshReadError};

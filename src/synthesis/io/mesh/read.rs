@@ -1,15 +1,15 @@
-//! Shared by readers of all formats: the bytes of a file, and errors.
+//! Errors of the readers of all formats.
+//!
+//! A message names places in a file (lines, parts), never what stands there: the file may not be what its name says,
+//! and messages end up in logs.
 
 use crate::synthesis::mesh::MeshError;
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
+use std::{io, path::PathBuf};
 
 /// The reason why a mesh could not be read from a file.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshReadError {
-    /// The file, or one it refers to, cannot be read.
+    /// The file cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Io {
         /// The file.
@@ -23,57 +23,52 @@ pub enum MeshReadError {
         /// The file.
         path: PathBuf,
     },
-    /// Content that is damaged or of an unsupported kind.
-    #[error("cannot read {}: {cause}", path.display())]
+    /// Content that is damaged, of an unsupported kind, or no usable mesh.
+    #[error("cannot use {}: {source}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
+        source: MeshDataError,
+    },
+}
+
+/// The reason why bytes could not be read as a mesh.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshDataError {
+    /// A line of an OBJ file that is damaged or of an unsupported kind.
+    #[error("line {line}: {cause}")]
+    Line {
+        /// The line, from 1; the first of those that are continued.
+        line: usize,
+        /// What is wrong with it.
+        cause: &'static str,
+    },
+    /// Content that is damaged or of an unsupported kind.
+    #[error("{cause}")]
+    Content {
+        /// What is wrong with it.
         cause: String,
     },
-    /// Content that makes no usable mesh.
-    #[error("cannot use the mesh in {}: {source}", path.display())]
-    Mesh {
-        /// The file.
+    /// A file of binary data, which the glTF file names, cannot be read.
+    #[error("its data in {} cannot be read: {source}", path.display())]
+    Data {
+        /// The file of data.
         path: PathBuf,
-        /// What is wrong with the mesh.
-        source: MeshError,
+        /// The system's error.
+        source: io::Error,
     },
+    /// No usable mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
 }
 
-/// An error while decoding content, before the file's name is known.
-#[derive(Debug)]
-pub(super) enum Fault {
-    /// A file that the content refers to cannot be read.
-    Io(PathBuf, io::Error),
-    /// Any other error in the content.
-    Content(String),
-    /// An error in the decoded mesh.
-    Mesh(MeshError),
-}
-
-impl Fault {
+impl MeshDataError {
     pub(super) fn content(cause: impl Into<String>) -> Self {
-        Self::Content(cause.into())
-    }
-
-    pub(super) fn in_file(self, path: &Path) -> MeshReadError {
-        let named = path.to_path_buf();
-        match self {
-            Self::Io(path, source) => MeshReadError::Io { path, source },
-            Self::Content(cause) => MeshReadError::Content { path: named, cause },
-            Self::Mesh(source) => MeshReadError::Mesh { path: named, source },
-        }
+        Self::Content { cause: cause.into() }
     }
 }
 
-impl From<MeshError> for Fault {
-    fn from(error: MeshError) -> Self {
-        Self::Mesh(error)
-    }
-}
-
-/// The bytes of a file.
-pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, Fault> {
-    std::fs::read(path).map_err(|error| Fault::Io(path.to_path_buf(), error))
-}
+/// What is wrong with a vertex that [`is_usable`](crate::synthesis::mesh::is_usable) refuses.
+pub(super) const BAD_POSITION: &str =
+    "a vertex has a coordinate that is not finite or beyond ±1e9; repair or rescale the mesh";

@@ -47,7 +47,8 @@ pub fn save_swc(path: impl AsRef<Path>, tree: &VesselTree, options: &SwcOptions)
 
 /// Writes a tree as SWC, nodes in the tree's order, lengths as they are.
 ///
-/// Every number has enough digits to be read back to the same bits. An empty tree gives only a header.
+/// Every number has enough digits to be read back to the same bits. An empty tree gives only a header. Lengths beyond
+/// ±[`MAX_COORDINATE`](crate::synthesis::mesh::MAX_COORDINATE) are written, but not read again.
 ///
 /// # Errors
 /// Those of `out`.

@@ -1,9 +1,15 @@
 //! Reading SWC. The format is described in `swc.rs`.
 
-use crate::synthesis::tree::{NO_PARENT, TreeError, VesselTree};
+use crate::synthesis::{
+    io::{
+        lines::{Lines, Utf16, text},
+        regular_file::read_whole,
+    },
+    mesh::MAX_COORDINATE,
+    tree::{NO_PARENT, TreeError, VesselTree},
+};
 use bevy_math::Vec3;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Options for reading a file.
@@ -17,24 +23,21 @@ pub struct SwcReadOptions {
 }
 
 /// The reason why a file could not be read as a tree.
+///
+/// A message names lines, never what stands there: the file may not be what its name says.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The file cannot be opened.
-    #[error("cannot open {}: {source}", path.display())]
-    Open {
+    /// The file cannot be read: it is missing, no regular file, or larger than 4 GiB.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
         /// The path given.
         path: PathBuf,
         /// The system's error.
         source: io::Error,
     },
-    /// Reading failed.
-    #[error("cannot read line {line}: {source}")]
-    Read {
-        /// The line, from 1.
-        line: usize,
-        /// The system's error.
-        source: io::Error,
-    },
+    /// Text of two bytes a letter.
+    #[error("{cause}", cause = Utf16::CAUSE)]
+    Utf16,
     /// A line with fewer than seven columns.
     #[error("line {line} has {found} columns; a node has 7: id type x y z radius parent")]
     Columns {
@@ -44,72 +47,62 @@ pub enum ReadError {
         found: usize,
     },
     /// A value that cannot be used.
-    #[error("line {line}: {column} is {value:?}; it must be {expected}")]
+    #[error("line {line}: {column} must be {expected}")]
     Value {
         /// The line, from 1.
         line: usize,
         /// Name of the column.
         column: &'static str,
-        /// The value in the file, cut off after [`ReadError::SHOWN`] characters.
-        value: String,
         /// The expected value.
         expected: &'static str,
     },
     /// Two nodes with one id.
-    #[error("line {line}: id {id} was given to a node before; ids must differ")]
+    #[error("line {line}: the node has the id of the node in line {first}; ids must differ")]
     DuplicateId {
         /// The later line, from 1.
         line: usize,
-        /// The id.
-        id: i64,
+        /// The earlier line, from 1.
+        first: usize,
     },
     /// A parent that the file does not have.
-    #[error("line {line}: no node has the parent's id {parent}; a root has parent -1")]
+    #[error("line {line}: no node has the parent's id; a root has parent -1")]
     UnknownParent {
         /// The line, from 1.
         line: usize,
-        /// The parent's id.
-        parent: i64,
     },
     /// Nodes that are their own ancestors.
-    #[error("line {line}: node {id} is its own ancestor; cut the loop, SWC holds trees only")]
+    #[error("line {line}: the node is its own ancestor; cut the loop, SWC holds trees only")]
     Cycle {
         /// Line of one of them, from 1.
         line: usize,
-        /// Its id.
-        id: i64,
     },
     /// An invalid tree, such as one with too many nodes.
     #[error(transparent)]
     Tree(#[from] TreeError),
 }
 
-impl ReadError {
-    /// Most characters of a bad value that a message repeats.
-    pub const SHOWN: usize = 40;
-}
-
 /// Reads a tree from an SWC file. See [`read_swc`].
 ///
 /// # Errors
-/// Those of [`read_swc`], and a file that cannot be opened.
+/// Those of [`read_swc`], and a file that cannot be read. Only regular files are read, of at most 4 GiB.
 pub fn load_swc(path: impl AsRef<Path>, options: &SwcReadOptions) -> Result<VesselTree, ReadError> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
-    read_swc(BufReader::new(file), options)
+    let bytes = read_whole(path).map_err(|source| ReadError::Io { path: path.to_owned(), source })?;
+    read_swc(&bytes, options)
 }
 
 /// Reads a tree, or forest, in SWC form. Lengths stay in the units of the file.
 ///
-/// Ids may be any whole numbers from 0 on, in any order. Nodes keep the order of the file if parents come first there;
-/// otherwise they are ordered by their distance from the roots. The type column is checked and dropped, as are columns
-/// after the seventh. Comments may hold any bytes, a byte order mark is skipped, lines may end in CR LF.
+/// Ids may be any whole numbers from 0 on, in any order, also written as `1.0`. Nodes keep the order of the file if
+/// parents come first there; otherwise they are ordered by their distance from the roots. The type column is checked
+/// and dropped, as are columns after the seventh. Comments may hold any bytes, a byte order mark is skipped, lines may
+/// end in LF, CR LF or CR.
 ///
 /// # Errors
-/// The first line that is not a node, refers to a missing node, or closes a loop; a radius that is not above zero,
-/// unless [`SwcReadOptions::least_radius`] raises it.
-pub fn read_swc(input: impl BufRead, options: &SwcReadOptions) -> Result<VesselTree, ReadError> {
-    let samples = read_samples(input, options)?;
+/// The first line that is not a node, refers to a missing node, or closes a loop; a coordinate or radius beyond
+/// ±[`MAX_COORDINATE`]; a radius that is not above zero, unless [`SwcReadOptions::least_radius`] raises it.
+pub fn read_swc(bytes: &[u8], options: &SwcReadOptions) -> Result<VesselTree, ReadError> {
+    let samples = read_samples(bytes, options)?;
     let parents = resolve_parents(&samples)?;
     let order = parents_first(&samples, &parents)?;
     let mut place = vec![NO_PARENT; samples.len()];
@@ -140,18 +133,12 @@ struct Sample {
 /// The parent's id of a root.
 const ROOT: i64 = -1;
 
-fn read_samples(mut input: impl BufRead, options: &SwcReadOptions) -> Result<Vec<Sample>, ReadError> {
+fn read_samples(bytes: &[u8], options: &SwcReadOptions) -> Result<Vec<Sample>, ReadError> {
+    let bytes = text(bytes).map_err(|Utf16| ReadError::Utf16)?;
     let mut samples = Vec::new();
-    let mut bytes = Vec::new();
-    for line in 1.. {
-        bytes.clear();
-        let count = input.read_until(b'\n', &mut bytes).map_err(|source| ReadError::Read { line, source })?;
-        if count == 0 {
-            break;
-        }
-        let text = bytes.strip_prefix(b"\xef\xbb\xbf").filter(|_| line == 1).unwrap_or(&bytes);
+    for (line, bytes) in Lines::new(bytes) {
         // Comments in old files may have any encoding. Other text that is not UTF-8 fails as a number, with its line.
-        let text = String::from_utf8_lossy(text.split(|&byte| byte == b'#').next().unwrap_or_default());
+        let text = String::from_utf8_lossy(bytes.split(|&byte| byte == b'#').next().unwrap_or_default());
         if !text.trim().is_empty() {
             samples.push(parse(&text, line, options)?);
         }
@@ -173,18 +160,14 @@ fn parse(text: &str, line: usize, options: &SwcReadOptions) -> Result<Sample, Re
         return Err(ReadError::Columns { line, found });
     }
     let [id, structure, x, y, z, radius, parent] = columns;
-    let bad = |column, value: &str, expected| ReadError::Value {
-        line,
-        column,
-        value: value.chars().take(ReadError::SHOWN).collect(),
-        expected,
-    };
+    let bad = |column, expected| ReadError::Value { line, column, expected };
     let whole = |column, value: &str, least: i64, expected| {
-        value.parse().ok().filter(|&number: &i64| number >= least).ok_or_else(|| bad(column, value, expected))
+        whole_number(value).filter(|&number| number >= least).ok_or_else(|| bad(column, expected))
     };
+    // As in meshes. Up to this, the fourth power of a radius is finite, by which blood flows.
     let number = |column, value: &str| {
-        let number = value.parse().ok().filter(|number: &f32| number.is_finite());
-        number.ok_or_else(|| bad(column, value, "a finite number"))
+        let number = value.parse().ok().filter(|number: &f32| number.abs() <= MAX_COORDINATE);
+        number.ok_or_else(|| bad(column, "a number within ±1e9"))
     };
     let id = whole("id", id, 0, "a whole number of at least 0")?;
     whole("type", structure, i64::MIN, "a whole number")?;
@@ -194,9 +177,20 @@ fn parse(text: &str, line: usize, options: &SwcReadOptions) -> Result<Sample, Re
     let least = options.least_radius.filter(|least| least.is_finite()).unwrap_or(0.0);
     let lifted = own.max(least);
     if lifted <= 0.0 {
-        return Err(bad("radius", radius, "above 0, or be lifted by the option least_radius"));
+        return Err(bad("radius", "above 0, or be lifted by the option least_radius"));
     }
     Ok(Sample { line, id, position, radius: lifted, parent })
+}
+
+/// A whole number, also one with a decimal point or an exponent, as numerical programs write all columns.
+fn whole_number(text: &str) -> Option<i64> {
+    /// Up to this, every whole number is an `f64`.
+    const MOST: f64 = 9_007_199_254_740_992.0;
+    let of_decimals = || {
+        let number: f64 = text.parse().ok()?;
+        (number.trunc() == number && number.abs() < MOST).then_some(number as i64)
+    };
+    text.parse().ok().or_else(of_decimals)
 }
 
 /// Index of every sample's parent in the file, [`NO_PARENT`] for a root.
@@ -206,7 +200,7 @@ fn resolve_parents(samples: &[Sample]) -> Result<Vec<u32>, ReadError> {
     for pair in by_id.windows(2) {
         let [first, second] = [pair[0], pair[1]].map(|index| &samples[index as usize]);
         if first.id == second.id {
-            return Err(ReadError::DuplicateId { line: second.line, id: second.id });
+            return Err(ReadError::DuplicateId { line: second.line, first: first.line });
         }
     }
     let index_of = |sample: &Sample| {
@@ -216,7 +210,7 @@ fn resolve_parents(samples: &[Sample]) -> Result<Vec<u32>, ReadError> {
         by_id
             .binary_search_by_key(&sample.parent, |&index| samples[index as usize].id)
             .map(|position| by_id[position])
-            .map_err(|_| ReadError::UnknownParent { line: sample.line, parent: sample.parent })
+            .map_err(|_| ReadError::UnknownParent { line: sample.line })
     };
     samples.iter().map(index_of).collect()
 }
@@ -258,5 +252,5 @@ fn cycle(samples: &[Sample], parents: &[u32], reached: &[u32]) -> ReadError {
     for _ in 0..parents.len() {
         at = parents.get(at).map_or(at, |&parent| parent as usize);
     }
-    ReadError::Cycle { line: samples[at].line, id: samples[at].id }
+    ReadError::Cycle { line: samples[at].line }
 }

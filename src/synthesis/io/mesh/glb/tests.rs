@@ -1,7 +1,12 @@
 //! All supported variants of files, and damaged ones.
 
-use super::*;
+use super::{
+    container::{MAGIC, decode_base64},
+    part::triangles,
+    *,
+};
 use crate::synthesis::mesh::MeshError;
+use bevy_math::Vec3;
 
 /// A binary file of a JSON text and data.
 fn binary(text: &str, data: &[u8]) -> Vec<u8> {
@@ -42,12 +47,12 @@ fn text(mode: u32, nodes: &str, uri: &str) -> String {
 
 const NODE: &str = r#"{"mesh":0,"scale":[0.01,0.01,0.01]}"#;
 
-fn read(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
-    decode(bytes, Path::new(""))
+fn read(bytes: &[u8]) -> Result<TriangleMesh, MeshDataError> {
+    read_gltf_in(bytes, Some(Path::new(".")))
 }
 
 #[test]
-fn quantised_positions_and_node_transforms_are_read() -> Result<(), Fault> {
+fn quantised_positions_and_node_transforms_are_read() -> Result<(), MeshDataError> {
     let mesh = read(&binary(&text(4, NODE, ""), &square()))?;
     assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3]]);
     assert!((mesh.area() - 1.0).abs() < 1e-6);
@@ -66,19 +71,19 @@ fn quantised_positions_and_node_transforms_are_read() -> Result<(), Fault> {
 
 #[test]
 fn strips_and_fans_are_triangles() {
-    assert_eq!(triangles(Mode::TriangleStrip, &[0, 1, 2, 3]), [[0, 1, 2], [2, 1, 3]]);
-    assert_eq!(triangles(Mode::TriangleFan, &[0, 1, 2, 3]), [[0, 1, 2], [0, 2, 3]]);
-    assert_eq!(triangles(Mode::Triangles, &[0, 1, 2, 3]), [[0, 1, 2]]);
-    for mode in [Mode::TriangleStrip, Mode::TriangleFan, Mode::Triangles] {
+    assert_eq!(triangles(Primitive::TRIANGLE_STRIP, &[0, 1, 2, 3]), [[0, 1, 2], [2, 1, 3]]);
+    assert_eq!(triangles(Primitive::TRIANGLE_FAN, &[0, 1, 2, 3]), [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(triangles(Primitive::TRIANGLES, &[0, 1, 2, 3]), [[0, 1, 2]]);
+    for mode in [Primitive::TRIANGLE_STRIP, Primitive::TRIANGLE_FAN, Primitive::TRIANGLES] {
         assert!(triangles(mode, &[]).is_empty() && triangles(mode, &[0, 1]).is_empty());
     }
     // Lines only: nothing to grow on.
     let lines = read(&binary(&text(1, NODE, ""), &square()));
-    assert!(matches!(lines, Err(Fault::Mesh(MeshError::Empty { .. }))));
+    assert!(matches!(lines, Err(MeshDataError::Mesh(MeshError::Empty { .. }))));
 }
 
 #[test]
-fn data_uris_and_files_are_read() -> Result<(), Fault> {
+fn data_uris_and_files_are_read() -> Result<(), MeshDataError> {
     let letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let data = [square(), vec![0, 0]].concat();
     let base64: String = data
@@ -94,9 +99,8 @@ fn data_uris_and_files_are_read() -> Result<(), Fault> {
     assert_eq!(read(text(4, NODE, &uri).as_bytes())?.triangles().len(), 2);
     assert_eq!(decode_base64("aGk="), Some(b"hi".to_vec()));
     assert_eq!(decode_base64("a-k="), None);
-    assert_eq!(decode_percent("a%20b%2.bin%"), "a b%2.bin%");
     let missing = read(text(4, NODE, r#","uri":"no%20such.bin""#).as_bytes());
-    assert!(matches!(missing, Err(Fault::Io(path, _)) if path == Path::new("no such.bin")));
+    assert!(matches!(missing, Err(MeshDataError::Data { path, .. }) if path == Path::new("./no such.bin")));
     Ok(())
 }
 

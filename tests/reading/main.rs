@@ -1,0 +1,8 @@
+//! Reading organs and trees: what a file shows is what grows, and no file harms.
+
+mod builder;
+mod cases;
+mod files;
+mod gltf;
+mod hostile;
+mod swc;
