@@ -49,7 +49,9 @@
 //! ```
 
 pub mod binding;
+pub mod cco;
 pub mod colonization;
+mod exponential;
 pub mod generator;
 pub mod growth;
 pub mod haemodynamics;

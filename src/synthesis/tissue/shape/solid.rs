@@ -67,6 +67,10 @@ impl Tissue for Ball {
         inside(self.center + (point - self.center).clamp_length_max(self.radius))
     }
 
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        Some(self.radius - point.distance(self.center))
+    }
+
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         Some(self.center + in_unit_ball(rng)? * self.radius)
     }
@@ -113,6 +117,10 @@ impl Tissue for Cuboid {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         inside(self.center + (point - self.center).clamp(-self.half, self.half))
+    }
+
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        Some((self.half - (point - self.center).abs()).min_element())
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
@@ -164,6 +172,11 @@ impl Tissue for Ellipsoid {
             return inside(point);
         }
         inside(self.center + nearest_on_ellipsoid((point - self.center).as_dvec3(), self.half.as_dvec3()).as_vec3())
+    }
+
+    /// Up to the ratio of two half axes too small: of all scaled ellipsoids, the point lies on one of those inside.
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        Some((1.0 - ((point - self.center) / self.half).length()) * self.half.min_element())
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
