@@ -1,18 +1,22 @@
 //! Which segment a new terminal joins: the one that makes the smallest tree.
 //!
-//! As in sections 4.3 to 4.5 of the paper, the nearest segments are candidates, each gets the best place for a
-//! bifurcation, and the one with the least volume of the whole tree is taken. The paper tests every candidate for
-//! intersections. That takes longest, so here the candidates are sorted by volume, and the first that has room is taken:
-//! the same choice.
+//! As in sections 4.3 to 4.5 of the paper, the nearest segments are candidates, each gets the best place for a bifurcation, and the one with the least volume of the whole tree is taken. The paper does all that for every candidate,
+//! and tests it for intersections. Here each gets a lower bound of its cost first, from one look at it. The best place is
+//! searched for, and room looked for, in the order of bounds and costs, until one candidate is connected: the same choice
+//! (branch and bound).
 
 use super::{
     distance::squared_to_segment,
     forest::NONE,
     joint::Joint,
     space::Space,
-    sums::Below,
+    sums::{Below, Slope},
 };
 use bevy_math::DVec3;
+
+/// How much more a search may gain than its first step promises. A search gains at most 1.3 times as much in 99.9 % of
+/// cases; a test compares choices with those of full searches.
+const PROMISE: f64 = 4.0;
 
 /// A way to connect a terminal.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,13 +29,50 @@ pub(super) struct Candidate {
     pub cost: f64,
 }
 
+/// A segment that a terminal may join, whose best place is not known yet.
+#[derive(Clone, Copy, Debug)]
+struct Guess {
+    segment: u32,
+    joint: Joint,
+    slope: Slope,
+    /// Less than what it costs.
+    bound: f64,
+}
+
+/// What is known of a candidate.
+#[derive(Clone, Copy, Debug)]
+enum Rank {
+    Guessed(Guess),
+    Known(Candidate),
+}
+
+impl Rank {
+    /// The least cost that it may have, and its segment, which decides between equals.
+    fn key(&self) -> (f64, u32) {
+        match self {
+            Self::Guessed(guess) => (guess.bound, guess.segment),
+            Self::Known(candidate) => (candidate.cost, candidate.segment),
+        }
+    }
+}
+
 /// Finds candidates, and keeps the buffers for them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Candidates {
     /// Distance within which enough segments are expected.
     reach: f64,
     found: Vec<(f64, u32)>,
-    pub sorted: Vec<Candidate>,
+    ranks: Vec<Rank>,
+}
+
+/// How an attempt to connect a terminal ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Attempt {
+    Connected,
+    /// None of the candidates had room.
+    Failed,
+    /// No segment is left, or the place is within a vessel.
+    Hopeless,
 }
 
 impl Candidates {
@@ -65,28 +106,52 @@ impl Candidates {
         self.found.truncate(count);
     }
 
-    /// Lists the ways to connect a point to its `count` nearest segments, the cheapest first. Returns how many segments
-    /// were looked at.
-    pub(super) fn list(
+    /// Connects a point to the best of its `count` nearest segments that has room, of which the first `known` have none.
+    pub(super) fn connect(
         &mut self,
-        space: &Space,
+        space: &mut Space,
         point: DVec3,
-        count: usize,
+        [known, count]: [usize; 2],
         tolerance: f64,
         may_join: impl Fn(u32) -> bool,
-    ) -> usize {
+    ) -> Attempt {
         self.nearest(space, point, count, may_join);
-        self.sorted.clear();
-        self.sorted.extend(self.found.iter().filter_map(|&(_, segment)| space.candidate(segment, point, tolerance)));
-        self.sorted.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.segment.cmp(&b.segment)));
-        self.found.len()
+        let is_within = |&(square, segment): &(f64, u32)| {
+            let bound = f64::from(space.forest.node(segment).bound);
+            square < bound * bound && square.sqrt() < space.radius(segment)
+        };
+        if self.found.len() <= known || known == 0 && self.found.iter().any(is_within) {
+            return Attempt::Hopeless;
+        }
+        self.ranks.clear();
+        self.ranks.extend(self.found[known..].iter().map(|&(_, segment)| Rank::Guessed(space.guess(segment, point))));
+        // The least bound or cost comes next: a cost below all bounds is the least cost.
+        while let Some(best) = (0..self.ranks.len()).min_by(|&a, &b| {
+            let (a, b) = (self.ranks[a].key(), self.ranks[b].key());
+            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+        }) {
+            match self.ranks[best] {
+                Rank::Guessed(guess) => match space.search(&guess, tolerance) {
+                    Some(candidate) => self.ranks[best] = Rank::Known(candidate),
+                    None => drop(self.ranks.swap_remove(best)),
+                },
+                Rank::Known(candidate) => {
+                    if space.connect(&candidate, point) {
+                        return Attempt::Connected;
+                    }
+                    self.ranks.swap_remove(best);
+                }
+            }
+        }
+        Attempt::Failed
     }
 }
 
 impl Space {
-    /// The best way to connect a point to a segment; `None` if the new segments would be too short for their radii.
-    pub(super) fn candidate(&self, segment: u32, point: DVec3, tolerance: f64) -> Option<Candidate> {
+    /// Bounds what it costs to connect a point to a segment.
+    fn guess(&self, segment: u32, point: DVec3) -> Guess {
         let (forest, node) = (&self.forest, self.forest.node(segment));
+        debug_assert!(node.parent != NONE);
         let joint = Joint {
             ends: [forest.place(node.parent), node.at.as_dvec3(), point],
             flows: [node.flow, 1.0],
@@ -94,24 +159,28 @@ impl Space {
             exponent: forest.exponent,
         };
         let start = joint.start();
-        let slope = forest.ascend(segment, joint.sums(start).trunk, 1.0).slope;
+        let ascent = forest.ascend(segment, joint.sums(start).trunk, 1.0);
+        let before = forest.node(self.root_segment(node.tree)).sums.volume;
+        let bound = ascent.root.volume - before - PROMISE * joint.promise(start, &ascent.slope);
+        Guess { segment, joint, slope: ascent.slope, bound: if bound.is_finite() { bound } else { f64::NEG_INFINITY } }
+    }
+
+    /// The best way to connect a point to a segment; `None` if the new segments would be too short for their radii.
+    fn search(&self, guess: &Guess, tolerance: f64) -> Option<Candidate> {
+        let Guess { segment, joint, slope, .. } = guess;
+        let (forest, node) = (&self.forest, self.forest.node(*segment));
         // Rounded, as it will be kept.
-        let place = joint.settle(start, &slope, tolerance).as_vec3().as_dvec3();
+        let place = joint.settle(joint.start(), slope, tolerance).as_vec3().as_dvec3();
         let sums = joint.sums(place);
-        let ascent = forest.ascend(segment, sums.trunk, 1.0);
+        let ascent = forest.ascend(*segment, sums.trunk, 1.0);
         let trunk = self.unit[node.tree as usize] * ascent.root.load * ascent.thinning;
-        let fourths = [
-            trunk,
-            trunk * sums.children[0].load / sums.below.load,
-            trunk * sums.children[1].load / sums.below.load,
-        ];
+        let child = |child: usize| trunk * sums.children[child].load / sums.below.load;
         // 2r ≤ l, as fourth powers.
         let is_long = |(fourth, length): (f64, f64)| 16.0 * fourth <= (length * length) * (length * length);
         let before = forest.node(self.root_segment(node.tree)).sums.volume;
         let cost = ascent.root.volume - before;
-        debug_assert!(node.parent != NONE);
-        (fourths.into_iter().zip(sums.lengths).all(is_long) && cost.is_finite())
-            .then_some(Candidate { segment, place, cost })
+        let are_long = [trunk, child(0), child(1)].into_iter().zip(sums.lengths).all(is_long);
+        (are_long && cost.is_finite()).then_some(Candidate { segment: *segment, place, cost })
     }
 
     /// Connects a terminal as a candidate says, if there is room; otherwise nothing is changed.

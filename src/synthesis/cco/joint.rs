@@ -79,55 +79,89 @@ impl Joint {
         [slope.load * flow + slope.volume * own(trunk, flow), child(0), child(1)]
     }
 
-    /// The place of least volume, to a relative `tolerance` of the tree's volume, found from `start`.
+    /// The place of least volume, found from `start`.
     ///
-    /// The volume depends on the trunk's sums as `slope` says, to first order. Each step is Newton's for constant
-    /// pulls. A step that does not lower the volume is halved, so the result is never worse than the start.
+    /// The volume depends on the trunk's sums as `slope` says, to first order. Each step is Newton's, and is halved while
+    /// it does not lower the volume, so the result is never worse than the start. The search ends when a step would
+    /// gain less than `tolerance` times what the second child's segment costs.
     pub(super) fn settle(&self, start: DVec3, slope: &Slope, tolerance: f64) -> DVec3 {
         let cost = |sums: &JointSums| slope.load * sums.trunk.load + slope.volume * sums.trunk.volume;
         let (mut place, mut sums) = (start, self.sums(start));
         let mut least = cost(&sums);
         for _ in 0..MOST_STEPS {
-            let Some(step) = self.step(place, &sums, slope) else { break };
-            let before = least;
-            let mut share = 1.0;
+            let Some(Step { mut way, gain, scale }) = self.step(place, &sums, slope) else { break };
+            if gain <= tolerance * scale {
+                break;
+            }
+            let mut gains = false;
             for _ in 0..HALVINGS {
-                let next = place + step * share;
-                let there = self.sums(next);
+                let there = self.sums(place + way);
                 let value = cost(&there);
                 if value < least {
-                    (place, sums, least) = (next, there, value);
+                    (place, sums, least, gains) = (place + way, there, value, true);
                     break;
                 }
-                share *= 0.5;
+                way *= 0.5;
             }
-            if !(before - least > tolerance * least.abs()) {
+            if !gains {
                 break;
             }
         }
         place
     }
 
-    /// Newton's step for constant pulls; a step against the gradient where that leads nowhere.
-    fn step(&self, place: DVec3, sums: &JointSums, slope: &Slope) -> Option<DVec3> {
+    /// What the first step of a search would gain.
+    pub(super) fn promise(&self, start: DVec3, slope: &Slope) -> f64 {
+        self.step(start, &self.sums(start), slope).map_or(f64::INFINITY, |step| step.gain)
+    }
+
+    /// Newton's step; a step against the gradient where that leads nowhere.
+    fn step(&self, place: DVec3, sums: &JointSums, slope: &Slope) -> Option<Step> {
         let pulls = self.pulls(sums, slope);
+        let stretches = self.stretches(sums, slope);
         let (mut gradient, mut curvature, mut weight) = (DVec3::ZERO, DMat3::ZERO, 0.0);
-        for ((end, pull), length) in self.ends.iter().zip(pulls).zip(sums.lengths) {
-            let towards = (end - place) / length;
-            let stiffness = pull.max(0.0) / length;
-            gradient -= towards * pull;
-            // Σ c/l·(1 − u·uᵀ)
+        for end in 0..3 {
+            let length = sums.lengths[end];
+            let towards = (self.ends[end] - place) / length;
+            let stiffness = pulls[end].max(0.0) / length;
+            gradient -= towards * pulls[end];
+            // Across the segment the pull turns, along it it changes: c/l·(1 − u·uᵀ) + c′·u·uᵀ.
             curvature += DMat3::from_diagonal(DVec3::splat(stiffness));
-            curvature -= DMat3::from_cols(towards * towards.x, towards * towards.y, towards * towards.z) * stiffness;
+            let along = towards * (stretches[end].max(0.0) - stiffness);
+            curvature += DMat3::from_cols(along * towards.x, along * towards.y, along * towards.z);
             weight += stiffness;
         }
         // Positive along a straight line, too.
-        curvature += DMat3::from_diagonal(DVec3::splat(1.0e-3 * weight));
+        curvature += DMat3::from_diagonal(DVec3::splat(1.0e-6 * weight));
         let newton = -(curvature.inverse() * gradient);
-        let plain = -gradient / weight;
-        let step = if newton.is_finite() && newton.dot(gradient) < 0.0 { newton } else { plain };
-        step.is_finite().then_some(step)
+        let is_descent = newton.is_finite() && newton.dot(gradient) < 0.0;
+        let way = if is_descent { newton } else { -gradient / weight };
+        let step = Step { way, gain: -0.5 * way.dot(gradient), scale: pulls[2] * sums.lengths[2] };
+        way.is_finite().then_some(step)
     }
+
+    /// Derivatives of the pulls by their own lengths, as far as they come from the segments themselves.
+    fn stretches(&self, at: &JointSums, slope: &Slope) -> [f64; 3] {
+        let by_volume = slope.volume * (at.trunk.load / at.below.load).sqrt();
+        let own = |sums: &Sums, flow: f64| {
+            let root = sums.load.sqrt();
+            flow / root - 0.25 * flow * flow * sums.volume / (sums.load * sums.load)
+        };
+        [
+            slope.volume * own(&at.trunk, self.flows[0] + self.flows[1]),
+            by_volume * own(&at.children[0], self.flows[0]),
+            by_volume * own(&at.children[1], self.flows[1]),
+        ]
+    }
+}
+
+/// A step of the search.
+struct Step {
+    way: DVec3,
+    /// What it would gain.
+    gain: f64,
+    /// Cost of the second child's segment.
+    scale: f64,
 }
 
 #[cfg(test)]

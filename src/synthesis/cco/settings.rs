@@ -64,7 +64,7 @@ pub struct CcoSettings {
     ///
     /// Limits: 1 to 1000. Default: [`Self::DEFAULT_CANDIDATES`].
     pub candidates: u32,
-    /// Relative change of the volume below which the search for the best bifurcation ends.
+    /// Share of the volume of a new segment below which a better place for the bifurcation is not searched for.
     ///
     /// Limits: 1e-12 to 0.1. Default: [`Self::DEFAULT_TOLERANCE`].
     pub tolerance: f32,
@@ -97,9 +97,9 @@ impl CcoSettings {
     /// N_con of OpenCCO.
     pub const DEFAULT_CANDIDATES: u32 = 20;
     /// How often the number of candidates is doubled for one terminal.
-    pub const MOST_DOUBLINGS: u32 = 3;
+    pub const MOST_DOUBLINGS: u32 = 2;
     /// Default of [`tolerance`](Self::tolerance).
-    pub const DEFAULT_TOLERANCE: f32 = 1.0e-8;
+    pub const DEFAULT_TOLERANCE: f32 = 1.0e-4;
     /// Default of [`polish_sweeps`](Self::polish_sweeps).
     pub const DEFAULT_POLISH_SWEEPS: u32 = 4;
     /// Checks every setting against its limits, and returns warnings about unusual ones.

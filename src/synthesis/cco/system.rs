@@ -1,7 +1,7 @@
 //! The trees of one kind of vessels, one new terminal at a time.
 
 use super::{
-    candidates::Candidates,
+    candidates::{Attempt, Candidates},
     domain::Domain,
     error::CcoError,
     power::cube_root,
@@ -133,18 +133,14 @@ impl System {
     }
 
     fn join(&mut self, space: &mut Space, place: DVec3, settings: &CcoSettings) -> bool {
-        let (mut count, mut last) = (settings.candidates as usize, 0);
+        let (mut known, mut count) = (0, settings.candidates as usize);
+        let (trees, tolerance) = (&self.trees, settings.tolerance.into());
         for _ in 0..=CcoSettings::MOST_DOUBLINGS {
-            let trees = &self.trees;
-            let may_join = |tree: u32| trees.contains(&tree);
-            let found = self.candidates.list(space, place, count, settings.tolerance.into(), may_join);
-            if self.candidates.sorted.iter().any(|candidate| space.connect(candidate, place)) {
-                return true;
+            match self.candidates.connect(space, place, [known, count], tolerance, |tree| trees.contains(&tree)) {
+                Attempt::Connected => return true,
+                Attempt::Failed => (known, count) = (count, 2 * count),
+                Attempt::Hopeless => return false,
             }
-            if found < count || found == last {
-                return false;
-            }
-            (last, count) = (found, 2 * count);
         }
         false
     }
