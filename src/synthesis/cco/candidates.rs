@@ -9,6 +9,7 @@ use super::{
     distance::squared_to_segment,
     forest::NONE,
     joint::Joint,
+    paths::Paths,
     space::Space,
     sums::{Below, Slope},
 };
@@ -63,6 +64,7 @@ pub(super) struct Candidates {
     reach: f64,
     found: Vec<(f64, u32)>,
     ranks: Vec<Rank>,
+    paths: Paths,
 }
 
 /// How an attempt to connect a terminal ended.
@@ -96,14 +98,19 @@ impl Candidates {
             if found.len() >= count || self.reach >= most {
                 break;
             }
-            self.reach *= 1.3;
+            self.reach *= 1.25;
         }
         // In trees that become denser, the reach follows.
-        if self.found.len() > 2 * count {
-            self.reach *= 0.9;
+        if 2 * self.found.len() > 3 * count {
+            self.reach *= 0.95;
         }
         self.found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         self.found.truncate(count);
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.paths.bytes()
     }
 
     /// Connects a point to the best of its `count` nearest segments that has room, of which the first `known` have none.
@@ -124,7 +131,10 @@ impl Candidates {
             return Attempt::Hopeless;
         }
         self.ranks.clear();
-        self.ranks.extend(self.found[known..].iter().map(|&(_, segment)| Rank::Guessed(space.guess(segment, point))));
+        self.paths.clear(&space.forest);
+        for &(_, segment) in &self.found[known..] {
+            self.ranks.push(Rank::Guessed(space.guess(segment, point, &mut self.paths)));
+        }
         // The least bound or cost comes next: a cost below all bounds is the least cost.
         while let Some(best) = (0..self.ranks.len()).min_by(|&a, &b| {
             let (a, b) = (self.ranks[a].key(), self.ranks[b].key());
@@ -149,7 +159,7 @@ impl Candidates {
 
 impl Space {
     /// Bounds what it costs to connect a point to a segment.
-    fn guess(&self, segment: u32, point: DVec3) -> Guess {
+    fn guess(&self, segment: u32, point: DVec3, paths: &mut Paths) -> Guess {
         let (forest, node) = (&self.forest, self.forest.node(segment));
         debug_assert!(node.parent != NONE);
         let joint = Joint {
@@ -159,10 +169,10 @@ impl Space {
             exponent: forest.exponent,
         };
         let start = joint.start();
-        let ascent = forest.ascend(segment, joint.sums(start).trunk, 1.0);
+        let (volume, slope) = paths.ascend(forest, segment, joint.sums(start).trunk);
         let before = forest.node(self.root_segment(node.tree)).sums.volume;
-        let bound = ascent.root.volume - before - PROMISE * joint.promise(start, &ascent.slope);
-        Guess { segment, joint, slope: ascent.slope, bound: if bound.is_finite() { bound } else { f64::NEG_INFINITY } }
+        let bound = volume - before - PROMISE * joint.promise(start, &slope);
+        Guess { segment, joint, slope, bound: if bound.is_finite() { bound } else { f64::NEG_INFINITY } }
     }
 
     /// The best way to connect a point to a segment; `None` if the new segments would be too short for their radii.

@@ -21,6 +21,8 @@ pub(super) struct SegmentGrid {
     origin: DVec3,
     /// Side of the largest cell: no segment is larger.
     side: f64,
+    /// The finest grid in use.
+    finest: usize,
     /// Segments of each grid.
     members: [Vec<u32>; LEVELS],
     cells: CellMap,
@@ -43,6 +45,7 @@ impl SegmentGrid {
             // One cell of margin for segments that reach beyond the box.
             origin: origin - side,
             side,
+            finest: LEVELS - 1,
             members: Default::default(),
             cells: CellMap::default(),
             heads: Vec::new(),
@@ -64,10 +67,15 @@ impl SegmentGrid {
         self.side / (1u64 << level) as f64
     }
 
-    /// The finest grid whose cells are as large as a segment.
+    /// Makes cells for new segments no smaller than this: searches reach so far that they would meet many of them.
+    pub(super) fn coarsen(&mut self, side: f64) {
+        self.finest = (0..LEVELS - 1).find(|&level| self.cell_side(level + 1) < side).unwrap_or(LEVELS - 1);
+    }
+
+    /// The finest grid in use whose cells are as large as a segment.
     fn level(&self, size: f64) -> usize {
         let mut level = 0;
-        while level + 1 < LEVELS && self.cell_side(level + 1) >= size {
+        while level < self.finest && self.cell_side(level + 1) >= size {
             level += 1;
         }
         level

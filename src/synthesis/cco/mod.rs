@@ -28,6 +28,7 @@ mod forest;
 mod grown;
 mod index;
 mod joint;
+mod paths;
 mod polish;
 mod power;
 mod report;

@@ -79,6 +79,22 @@ impl Slope {
         self.volume *= volume;
         self.root_load *= load;
     }
+
+    /// The slope of the whole way, where `self` is that of the lower part and `above` that of the upper one.
+    pub(super) fn then(&self, above: &Self) -> Self {
+        Self {
+            load: above.load * self.root_load + above.volume * self.load,
+            volume: above.volume * self.volume,
+            root_load: above.root_load * self.root_load,
+        }
+    }
+
+    /// The slope of the upper part, where `self` is that of the whole way and `below` that of the lower part.
+    pub(super) fn without(&self, below: &Self) -> Self {
+        let volume = self.volume / below.volume;
+        let load = (self.load - volume * below.load) / below.root_load;
+        Self { load, volume, root_load: self.root_load / below.root_load }
+    }
 }
 
 /// Derivative of a segment's volume by the load of what is below it, at constant volumes of the children.

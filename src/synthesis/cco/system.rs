@@ -118,6 +118,7 @@ impl System {
         };
         let (old, unit) = (space.unit[self.trees[0] as usize], self.unit_at(&space.domain, self.terminals + 1, settings));
         self.set_unit(space, unit);
+        space.index.coarsen(self.vacancy.threshold());
         if self.join(space, place, settings) {
             self.vacancy.take(&space.domain, place);
             self.terminals += 1;
@@ -170,6 +171,6 @@ impl System {
 
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.vacancy.bytes()
+        self.vacancy.bytes() + self.candidates.bytes()
     }
 }
