@@ -26,7 +26,7 @@ impl Space {
     /// so, all bounds and strains are up to date.
     pub(super) fn has_room(&mut self, changed: &[u32]) -> bool {
         for &segment in changed {
-            if !self.clear(segment) {
+            if !self.clear(segment, self.reserve) {
                 return false;
             }
         }
@@ -69,7 +69,7 @@ impl Space {
             stack.extend(children.map(|&child| (child, radius * self.forest.thinning(child).sqrt().sqrt())));
         }
         let fits = wide.iter().all(|&segment| {
-            let fits = self.clear(segment);
+            let fits = self.clear(segment, 1.0);
             if fits {
                 self.strain_from(segment);
             }
@@ -79,8 +79,9 @@ impl Space {
         fits
     }
 
-    /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room.
-    fn clear(&mut self, segment: u32) -> bool {
+    /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room for radii
+    /// that are `reserve` times as wide.
+    fn clear(&mut self, segment: u32, reserve: f64) -> bool {
         let radius = self.radius(segment);
         let parent = self.forest.node(segment).parent;
         let ends = [self.forest.place(parent), self.forest.place(segment)];
@@ -108,7 +109,7 @@ impl Space {
             }
             let (distance, other_radius) = (square.sqrt(), self.radius(other));
             let spare = distance - APART * (radius + other_radius);
-            if spare < 0.0 {
+            if spare < 0.0 || distance < reserve * (radius + other_radius) {
                 has_room = false;
                 return false;
             }

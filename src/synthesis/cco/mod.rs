@@ -175,6 +175,7 @@ impl Cco {
         if self.is_finished() {
             return;
         }
+        self.space.reserve = 1.0;
         let [node, sweeps] = &mut self.polished;
         let nodes = self.space.forest.nodes.len() as u32;
         let end = nodes.min(*node + POLISHED);

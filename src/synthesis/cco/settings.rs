@@ -97,7 +97,7 @@ impl CcoSettings {
     /// N_con of OpenCCO.
     pub const DEFAULT_CANDIDATES: u32 = 20;
     /// How often the number of candidates is doubled for one terminal.
-    pub const MOST_DOUBLINGS: u32 = 2;
+    pub const MOST_DOUBLINGS: u32 = 1;
     /// Default of [`tolerance`](Self::tolerance).
     pub const DEFAULT_TOLERANCE: f32 = 1.0e-4;
     /// Default of [`polish_sweeps`](Self::polish_sweeps).

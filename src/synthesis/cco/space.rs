@@ -21,6 +21,8 @@ pub(super) struct Space {
     pub unit: Vec<f64>,
     /// The root node of each tree.
     pub roots: Vec<u32>,
+    /// Factor of the radii for which new segments must have room: what they are expected to grow by.
+    pub reserve: f64,
     /// Nodes as they were before a change, in the order in which they were changed.
     pub(super) before: Vec<(u32, Node)>,
     /// Number of nodes before the change.
@@ -45,6 +47,7 @@ impl Space {
             forest,
             unit: Vec::new(),
             roots: Vec::new(),
+            reserve: 1.0,
             before: Vec::new(),
             nodes_before: 0,
             moved: Vec::new(),

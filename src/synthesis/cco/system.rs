@@ -16,6 +16,9 @@ use std::f64::consts::PI;
 
 /// Places from which the end of the first vessel is chosen.
 const FIRST_PLACES: usize = 64;
+/// Room for growth that the first segments get, as a share of their radii. Vessels that touch early are in the way of
+/// all later terminals, since trunks become wider with each.
+const RESERVE: f64 = 0.1;
 /// Places refused in a row after which a kind has no room for more.
 const MOST_REFUSED: u32 = 2000;
 
@@ -119,6 +122,8 @@ impl System {
         let (old, unit) = (space.unit[self.trees[0] as usize], self.unit_at(&space.domain, self.terminals + 1, settings));
         self.set_unit(space, unit);
         space.index.coarsen(self.vacancy.threshold());
+        let share = f64::from(self.terminals) / f64::from(settings.terminals);
+        space.reserve = 1.0 + RESERVE * (1.0 - share);
         if self.join(space, place, settings) {
             self.vacancy.take(&space.domain, place);
             self.terminals += 1;
