@@ -32,7 +32,7 @@ pub(super) struct Candidate {
 
 /// A segment that a terminal may join, whose best place is not known yet.
 #[derive(Clone, Copy, Debug)]
-struct Guess {
+pub(super) struct Guess {
     segment: u32,
     joint: Joint,
     slope: Slope,
@@ -159,7 +159,7 @@ impl Candidates {
 
 impl Space {
     /// Bounds what it costs to connect a point to a segment.
-    fn guess(&self, segment: u32, point: DVec3, paths: &mut Paths) -> Guess {
+    pub(super) fn guess(&self, segment: u32, point: DVec3, paths: &mut Paths) -> Guess {
         let (forest, node) = (&self.forest, self.forest.node(segment));
         debug_assert!(node.parent != NONE);
         let joint = Joint {
@@ -176,7 +176,7 @@ impl Space {
     }
 
     /// The best way to connect a point to a segment; `None` if the new segments would be too short for their radii.
-    fn search(&self, guess: &Guess, tolerance: f64) -> Option<Candidate> {
+    pub(super) fn search(&self, guess: &Guess, tolerance: f64) -> Option<Candidate> {
         let Guess { segment, joint, slope, .. } = guess;
         let (forest, node) = (&self.forest, self.forest.node(*segment));
         // Rounded, as it will be kept.

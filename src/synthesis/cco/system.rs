@@ -20,7 +20,7 @@ const FIRST_PLACES: usize = 64;
 /// all later terminals, since trunks become wider with each.
 const RESERVE: f64 = 0.1;
 /// Places refused in a row after which a kind has no room for more.
-const MOST_REFUSED: u32 = 2000;
+const MOST_REFUSED: u32 = 500;
 
 /// The trees of one kind.
 #[derive(Clone, Debug)]
