@@ -45,7 +45,11 @@ fn compare(is_flat: bool, (terminals, volume, radius): (u32, f64, f64)) {
     for (sweeps, limit) in [(0, 1.02), (CcoSettings::DEFAULT_POLISH_SWEEPS, 0.98)] {
         let (ours, root) = means(is_flat, terminals, sweeps);
         let name = if is_flat { "disc" } else { "ball" };
-        println!("{name}, {terminals} terminals, {sweeps} sweeps: {:.4} of its volume, root {:.4}", ours / volume, root / radius);
+        println!(
+            "{name}, {terminals} terminals, {sweeps} sweeps: {:.4} of its volume, root {:.4}",
+            ours / volume,
+            root / radius
+        );
         assert!(ours <= limit * volume, "{name} {terminals}, {sweeps} sweeps: {ours}, OpenCCO {volume}");
         assert!((root / radius - 1.0).abs() <= 0.05, "{name} {terminals}: root radius {root}, OpenCCO {radius}");
     }

@@ -13,7 +13,9 @@ use bevy_math::{DVec3, Vec3};
 use std::sync::Arc;
 
 /// Cells of the grid along the longest side of the tissue.
-const RESOLUTION: f32 = 64.0;
+const RESOLUTION: f32 = 128.0;
+/// Those of the coarse grid that tells where a finer one is of use.
+const COARSE: f32 = 24.0;
 /// Excess of depth, as a share of what is needed, at which a segment that is traced counts as inside. It is the least
 /// step of the trace, too.
 const MARGIN: f64 = 0.01;
@@ -175,15 +177,24 @@ impl Domain {
 }
 
 impl DepthGrid {
+    /// Searches for depths inside and near the border; beyond, an upper bound by a coarse grid is enough.
     fn new(tissue: &dyn Tissue, min: Vec3, max: Vec3) -> Self {
+        let search = |point| tissue.depth(point).unwrap_or(f32::NEG_INFINITY);
+        let coarse = Self::filled(min, max, COARSE, search);
         let cell = (max - min).max_element() / RESOLUTION;
+        Self::filled(min, max, RESOLUTION, |point| match coarse.bounds(point) {
+            Some([_, most]) if most < f64::from(-2.0 * cell) => most as f32,
+            _ => search(point),
+        })
+    }
+
+    fn filled(min: Vec3, max: Vec3, resolution: f32, depth: impl Fn(Vec3) -> f32 + Sync) -> Self {
+        let cell = (max - min).max_element() / resolution;
         let size = ((max - min) / cell).to_array().map(|count| (count.ceil() as usize).max(1));
         let numbers: Vec<u32> = (0..(size[0] * size[1] * size[2]) as u32).collect();
         let mut grid = Self { corner: min, cell, size, depths: Vec::new() };
         let mut depths = Vec::new();
-        parallel::map_into(&numbers, &mut depths, 0.0, |&number| {
-            tissue.depth(grid.center(number as usize)).unwrap_or(f32::NEG_INFINITY)
-        });
+        parallel::map_into(&numbers, &mut depths, 0.0, |&number| depth(grid.center(number as usize)));
         grid.depths = depths;
         grid
     }

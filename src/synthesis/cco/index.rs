@@ -158,13 +158,7 @@ impl SegmentGrid {
         }
     }
 
-    fn near_in(
-        &self,
-        level: usize,
-        [from, to]: [DVec3; 2],
-        reach: f64,
-        visit: &mut impl FnMut(u32) -> bool,
-    ) -> bool {
+    fn near_in(&self, level: usize, [from, to]: [DVec3; 2], reach: f64, visit: &mut impl FnMut(u32) -> bool) -> bool {
         let (way, side) = (to - from, self.cell_side(level));
         let margin = reach + 0.5 * side;
         // Along a line that is longer than a cell, piece by piece: its box would have too many cells.

@@ -13,7 +13,7 @@ use super::{
 use bevy_math::{DMat3, DVec3};
 
 /// Most steps of the search. Newton's method takes three to five.
-const MOST_STEPS: usize = 40;
+const MOST_STEPS: usize = 100;
 /// Halvings of a step that does not lower the volume.
 const HALVINGS: usize = 12;
 /// Least length of a segment, as a share of the joint's size: a pull has no direction at its end.
@@ -81,31 +81,24 @@ impl Joint {
 
     /// The place of least volume, found from `start`.
     ///
-    /// The volume depends on the trunk's sums as `slope` says, to first order. Each step is Newton's, and is halved while
-    /// it does not lower the volume, so the result is never worse than the start. The search ends when a step would
+    /// The volume depends on the trunk's sums as `slope` says, to first order. Each step is Newton's, or else one
+    /// against the gradient, and is halved while it does not lower the volume: the result is never worse than the start. The search ends when a step would
     /// gain less than `tolerance` times what the second child's segment costs.
     pub(super) fn settle(&self, start: DVec3, slope: &Slope, tolerance: f64) -> DVec3 {
         let cost = |sums: &JointSums| slope.load * sums.trunk.load + slope.volume * sums.trunk.volume;
         let (mut place, mut sums) = (start, self.sums(start));
         let mut least = cost(&sums);
         for _ in 0..MOST_STEPS {
-            let Some(Step { mut way, gain, scale }) = self.step(place, &sums, slope) else { break };
+            let Some(Step { way, plain, gain, scale }) = self.step(place, &sums, slope) else { break };
             if gain <= tolerance * scale {
                 break;
             }
-            let mut gains = false;
-            for _ in 0..HALVINGS {
-                let there = self.sums(place + way);
-                let value = cost(&there);
-                if value < least {
-                    (place, sums, least, gains) = (place + way, there, value, true);
-                    break;
-                }
-                way *= 0.5;
-            }
-            if !gains {
-                break;
-            }
+            let shares = || std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
+            let tries = shares().map(|share| way * share).chain(shares().map(|share| plain * share));
+            let found =
+                tries.map(|step| (place + step, self.sums(place + step))).find(|(_, there)| cost(there) < least);
+            let Some((next, there)) = found else { break };
+            (place, sums, least) = (next, there, cost(&there));
         }
         place
     }
@@ -135,8 +128,9 @@ impl Joint {
         curvature += DMat3::from_diagonal(DVec3::splat(1.0e-6 * weight));
         let newton = -(curvature.inverse() * gradient);
         let is_descent = newton.is_finite() && newton.dot(gradient) < 0.0;
-        let way = if is_descent { newton } else { -gradient / weight };
-        let step = Step { way, gain: -0.5 * way.dot(gradient), scale: pulls[2] * sums.lengths[2] };
+        let plain = -gradient / weight;
+        let way = if is_descent { newton } else { plain };
+        let step = Step { way, plain, gain: -0.5 * way.dot(gradient), scale: pulls[2] * sums.lengths[2] };
         way.is_finite().then_some(step)
     }
 
@@ -157,7 +151,10 @@ impl Joint {
 
 /// A step of the search.
 struct Step {
+    /// Newton's step, if that goes down.
     way: DVec3,
+    /// A step against the gradient.
+    plain: DVec3,
     /// What it would gain.
     gain: f64,
     /// Cost of the second child's segment.

@@ -62,6 +62,9 @@ use system::System;
 
 /// Nodes that a step of polishing looks at.
 const POLISHED: u32 = 64;
+/// Number of nodes after which all bifurcations are polished for the first time. That is done again whenever the
+/// number has doubled, since later terminals join better trees then.
+const FIRST_SWEEP: usize = 64;
 /// Places that a step draws at most.
 const DRAWS: u32 = 8;
 
@@ -98,8 +101,10 @@ pub struct Cco {
     rng: VesselRng,
     /// Terminals placed, and steps of polishing done.
     steps: u32,
-    /// Node at which polishing goes on, and sweeps done.
+    /// Node at which polishing goes on, and sweeps done at the end.
     polished: [u32; 2],
+    /// Number of nodes from which on a sweep is due while the trees grow.
+    due: usize,
     grown: ByKind<Option<Grown>>,
 }
 
@@ -110,12 +115,7 @@ impl Cco {
     /// # Errors
     /// A setting outside its limits; a tissue that is neither flat nor solid; roots that cannot be placed as requested,
     /// that have no room for a vessel, or of which there are none.
-    pub fn new(
-        tissue: Arc<dyn Tissue>,
-        settings: CcoSettings,
-        roots: &Roots,
-        seed: u64,
-    ) -> Result<Self, CcoError> {
+    pub fn new(tissue: Arc<dyn Tissue>, settings: CcoSettings, roots: &Roots, seed: u64) -> Result<Self, CcoError> {
         settings.validate()?;
         let domain = Domain::new(Arc::clone(&tissue), settings.border_distance)?;
         for (kind, given) in roots.given.iter() {
@@ -132,6 +132,7 @@ impl Cco {
             rng: Stream::Terminals.rng(seed),
             steps: 0,
             polished: [0; 2],
+            due: FIRST_SWEEP,
             grown: ByKind::default(),
             settings,
         };
@@ -161,9 +162,13 @@ impl Cco {
     /// Does one step: connects the next terminal, of the kind that has fewest, or looks at some bifurcations once all
     /// terminals are placed. Does nothing once growth is finished.
     pub fn advance(&mut self) {
+        let is_growing = self.systems.iter().any(|system| !system.is_done(&self.settings));
+        if !is_growing || self.space.forest.nodes.len() >= self.due && self.settings.polish_sweeps > 0 {
+            return self.polish(is_growing);
+        }
         for _ in 0..DRAWS {
             let open = self.systems.iter_mut().filter(|system| !system.is_done(&self.settings));
-            let Some(system) = open.min_by_key(|system| system.terminals) else { return self.polish() };
+            let Some(system) = open.min_by_key(|system| system.terminals) else { return };
             if system.advance(&mut self.space, &self.settings, &mut self.rng) {
                 self.steps += 1;
                 return;
@@ -171,20 +176,27 @@ impl Cco {
         }
     }
 
-    fn polish(&mut self) {
+    fn polish(&mut self, is_growing: bool) {
         if self.is_finished() {
             return;
         }
-        self.space.reserve = 1.0;
+        if !is_growing {
+            self.space.reserve = 1.0;
+        }
+        let nodes = self.space.forest.nodes.len();
         let [node, sweeps] = &mut self.polished;
-        let nodes = self.space.forest.nodes.len() as u32;
-        let end = nodes.min(*node + POLISHED);
+        let end = (nodes as u32).min(*node + POLISHED);
         for node in *node..end {
             self.space.polish(node, self.settings.tolerance.into());
         }
         *node = end;
-        if end == nodes {
-            (*node, *sweeps) = (0, *sweeps + 1);
+        if end as usize == nodes {
+            *node = 0;
+            if is_growing {
+                self.due = 2 * nodes;
+            } else {
+                *sweeps += 1;
+            }
         }
         self.steps += 1;
     }
@@ -234,7 +246,12 @@ impl Cco {
     /// The steps done, and all of them: one for each terminal, and those of polishing.
     pub fn steps(&self) -> StepCount {
         let wanted = u64::from(self.settings.terminals) * self.systems.len() as u64;
-        let polishing = (2 * wanted).div_ceil(POLISHED.into()) * u64::from(self.settings.polish_sweeps);
+        // The sweeps while the trees grow look at about twice as many nodes as the last one.
+        let sweeps = match self.settings.polish_sweeps {
+            0 => 0,
+            sweeps => u64::from(sweeps) + 2,
+        };
+        let polishing = (2 * wanted).div_ceil(POLISHED.into()) * sweeps;
         let all = u32::try_from(wanted + polishing).unwrap_or(u32::MAX);
         StepCount { done: if self.is_finished() { all } else { self.steps.min(all) }, all }
     }

@@ -70,8 +70,8 @@ pub struct CcoSettings {
     pub tolerance: f32,
     /// Sweeps at the end that move every bifurcation to the place of least volume under the final flows.
     ///
-    /// 0 leaves the bifurcations where they were made, as OpenCCO does. Each sweep takes about a fifth as long as the
-    /// growth; after four little is left to gain.
+    /// 0 leaves the bifurcations where they were made, as OpenCCO does. Otherwise there is one more sweep whenever the
+    /// number of terminals has doubled. After four at the end little is left to gain.
     ///
     /// Limits: ≤ 100. Default: [`Self::DEFAULT_POLISH_SWEEPS`].
     pub polish_sweeps: u32,

