@@ -1,9 +1,9 @@
 //! The speed of constrained constructive optimisation, on one thread: per terminal in a disc and a ball, as OpenCCO was
 //! measured (12.9 ms a terminal for 1000 in a ball), and of tens of thousands of terminals in real organs.
 //!
-//! `cargo bench --bench cco` runs everything up to 20,000 terminals; `-- large` runs 100,000 and 500,000 in a liver, once
-//! each, and prints bytes a terminal. Organs are found as `CONTRIBUTING.md` says; without them they are left out. Times on
-//! a shared machine vary: compare only lines of one run.
+//! `cargo bench --bench cco` runs everything up to 20,000 terminals; `-- large` runs 100,000 and 500,000 in a liver,
+//! once each, and prints bytes a terminal. Organs are found as `CONTRIBUTING.md` says; without them they are left out.
+//! Times on a shared machine vary: compare only lines of one run.
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{

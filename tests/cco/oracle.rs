@@ -130,7 +130,8 @@ fn check_flow(name: &str, growth: &Cco, tree: &VesselTree) {
     }
 }
 
-/// Every segment keeps its whole width inside, by points along it. A root's may be nearer to the border where it enters.
+/// Every segment keeps its whole width inside, by points along it. A root's may be nearer to the border where it
+/// enters.
 fn check_inside(name: &str, growth: &Cco) {
     let tissue = growth.tissue();
     let trees: Vec<&VesselTree> = VesselKind::ALL.iter().map(|&kind| growth.tree(kind)).collect();

@@ -1,8 +1,8 @@
 //! Volume and radii in comparison with those of OpenCCO.
 //!
 //! OpenCCO lets a volume grow by the law for areas, so that its final ball is k^(1/6) times as large as its perfusion
-//! volume says, and its vessels are as thin as in that. It measures lengths in the smaller ball. Here the perfusion volume
-//! is √k times as large, which is the same tree, and volumes are divided by k^(1/6).
+//! volume says, and its vessels are as thin as in that. It measures lengths in the smaller ball. Here the perfusion
+//! volume is √k times as large, which is the same tree, and volumes are divided by k^(1/6).
 
 use crate::arteries;
 use bevy_math::Vec3;

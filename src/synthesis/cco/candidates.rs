@@ -1,9 +1,10 @@
 //! Which segment a new terminal joins: the one that makes the smallest tree.
 //!
-//! As in sections 4.3 to 4.5 of the paper, the nearest segments are candidates, each gets the best place for a bifurcation, and the one with the least volume of the whole tree is taken. The paper does all that for every candidate,
-//! and tests it for intersections. Here each gets a lower bound of its cost first, from one look at it. The best place is
-//! searched for, and room looked for, in the order of bounds and costs, until one candidate is connected: the same choice
-//! (branch and bound).
+//! As in sections 4.3 to 4.5 of the paper, the nearest segments are candidates, each gets the best place for a
+//! bifurcation, and the one with the least volume of the whole tree is taken. The paper does all that for every
+//! candidate, and tests it for intersections. Here each gets a lower bound of its cost first, from one look at it. The
+//! best place is searched for, and room looked for, in the order of bounds and costs, until one candidate is connected:
+//! the same choice (branch and bound).
 
 use super::{
     distance::squared_to_segment,
@@ -15,8 +16,8 @@ use super::{
 };
 use bevy_math::DVec3;
 
-/// How much more a search may gain than its first step promises. A search gains at most 1.3 times as much in 99.9 % of
-/// cases; a test compares choices with those of full searches.
+/// How much more a search may gain than its first step promises, for a bound. A test compares the choices with those of
+/// full searches.
 const PROMISE: f64 = 4.0;
 
 /// A way to connect a terminal.
@@ -78,7 +79,7 @@ pub(super) enum Attempt {
 }
 
 impl Candidates {
-    /// The nearest segments to a point, among those of trees that `may_join` accepts: at most `count`, the nearest first.
+    /// The nearest segments to a point, of trees that `may_join` accepts: at most `count`, the nearest first.
     fn nearest(&mut self, space: &Space, point: DVec3, count: usize, may_join: impl Fn(u32) -> bool) {
         let most = space.domain.diagonal();
         self.reach = if self.reach > 0.0 { self.reach } else { 0.1 * most };
@@ -113,7 +114,7 @@ impl Candidates {
         self.paths.bytes()
     }
 
-    /// Connects a point to the best of its `count` nearest segments that has room, of which the first `known` have none.
+    /// Connects a point to the best of its `count` nearest segments that has room. The first `known` have none.
     pub(super) fn connect(
         &mut self,
         space: &mut Space,

@@ -1,10 +1,11 @@
 //! No two segments of any trees overlap, unless they share a node, and none leaves the tissue.
 //!
-//! A new terminal changes the radii of all segments of its tree a little, so a look at the new ones is not enough. Every
-//! segment has a *bound*: a radius that it may have without touching others at theirs, or the border. Each subtree keeps
-//! its *strain*, the largest ratio of radius to bound in it, for a radius of 1 at its top. If the root's radius times
-//! the root's strain is at most 1, all segments of the tree are within their bounds: one comparison for a million
-//! segments. Otherwise the strains lead to those that are not. They get wider bounds, if their neighbours leave room.
+//! A new terminal changes the radii of all segments of its tree a little, so a look at the new ones is not enough.
+//! Every segment has a *bound*: a radius that it may have without touching others at theirs, or the border. Each
+//! subtree keeps its *strain*, the largest ratio of radius to bound in it, for a radius of 1 at its top. If the root's
+//! radius times the root's strain is at most 1, all segments of the tree are within their bounds: one comparison for a
+//! million segments. Otherwise the strains lead to those that are not. They get wider bounds, if their neighbours leave
+//! room.
 //!
 //! A bound is 5 % above the radius, so a segment is looked at again only after it grew by that. If two bounds leave no
 //! room between two segments while their radii do, both bounds are drawn in.
@@ -79,8 +80,8 @@ impl Space {
         fits
     }
 
-    /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room for radii
-    /// that are `reserve` times as wide.
+    /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room for
+    /// radii that are `reserve` times as wide.
     fn clear(&mut self, segment: u32, reserve: f64) -> bool {
         let radius = self.radius(segment);
         let parent = self.forest.node(segment).parent;

@@ -1,8 +1,8 @@
 //! The tissue as a domain: how deep a point lies, and whether a segment stays inside.
 //!
-//! Depths of a mesh are searched for, so the domain keeps them at the centres of a grid. A depth changes by no more than
-//! the way between two points, so a value at a centre bounds those around it from both sides; only where the bound does
-//! not decide, near the border, the mesh is asked.
+//! Depths of a mesh are searched for, so the domain keeps them at the centres of a grid. A depth changes by no more
+//! than the way between two points, so a value at a centre bounds those around it from both sides; only where the bound
+//! does not decide, near the border, the mesh is asked.
 
 use super::error::CcoError;
 use crate::synthesis::{
@@ -63,7 +63,7 @@ impl Domain {
             return Err(CcoError::NoInside {
                 tissue: match tissue.extent() {
                     Extent::Length(_) => "a curve",
-                    Extent::Area(_) => "a curved surface",
+                    Extent::Area(_) => "a curved surface, or an area whose border is not known,",
                     Extent::Volume(_) => "a volume whose border is not known",
                 },
             });

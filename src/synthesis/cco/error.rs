@@ -60,13 +60,13 @@ pub enum CcoError {
     #[error("there is no root; place at least one")]
     NoRoot,
     /// A given tree, from which this generator cannot grow yet.
-    #[error("the {} vessels have a given tree; constrained constructive optimisation grows from roots only", kind.name())]
+    #[error("the {} vessels have a given tree; this generator grows from roots only: give it none", kind.name())]
     GivenTree {
         /// The kind in question.
         kind: VesselKind,
     },
     /// Fewer terminals than roots.
-    #[error("{terminals} terminals are not enough for {roots} roots of the {} vessels; each root needs one", kind.name())]
+    #[error("{terminals} terminals are too few for {roots} roots of the {} vessels; each needs one", kind.name())]
     MoreRootsThanTerminals {
         /// The kind in question.
         kind: VesselKind,

@@ -1,8 +1,8 @@
 //! Where segments are: a hashed grid for each octave of their size.
 //!
 //! The size of a segment is its length and twice its bound. A segment lies in the grid whose cells are just as large or
-//! larger, in the cell of its middle, so that it reaches at most half a cell beyond. That finds long and thick vessels as
-//! surely as short ones, and every segment is stored once.
+//! larger, in the cell of its middle, so that it reaches at most half a cell beyond. That finds long and thick vessels
+//! as surely as short ones, and every segment is stored once.
 
 use super::{
     cell_map::CellMap,

@@ -1,8 +1,8 @@
 //! Ways from candidates to the root, which they share.
 //!
 //! The candidates of a terminal lie near each other, so their ways meet soon. What one changes above that point is
-//! nearly what another does: the volume of the whole tree is taken to be linear there. That serves for a bound, not for a
-//! cost.
+//! nearly what another does: the volume of the whole tree is taken to be linear there. That serves for a bound, not for
+//! a cost.
 
 use super::{
     forest::{Forest, NONE},

@@ -1,7 +1,7 @@
 //! Moves every bifurcation to the place of least volume under the final flows.
 //!
-//! OpenCCO leaves a bifurcation where it was best when it was made. Sweeps over all bifurcations, each with the others as
-//! they are by then (Gauss–Seidel), take some per cent off the volume. A bifurcation moves only if there is room.
+//! OpenCCO leaves a bifurcation where it was best when it was made. Sweeps over all bifurcations, each with the others
+//! as they are by then (Gauss–Seidel), take some per cent off the volume. A bifurcation moves only if there is room.
 
 use super::{forest::NONE, joint::Joint, space::Space};
 

@@ -1,7 +1,7 @@
 //! A constrained constructive optimisation as a [`Growth`] like any other.
 //!
-//! An insertion splits a segment: the new bifurcation comes before an old node. Trees are in the order from their roots,
-//! so the nodes after it get other numbers, and each [`settle`](Growth::settle) replaces the tree.
+//! An insertion splits a segment: the new bifurcation comes before an old node. Trees are in the order from their
+//! roots, so the nodes after it get other numbers, and each [`settle`](Growth::settle) replaces the tree.
 
 use super::Cco;
 use crate::synthesis::{

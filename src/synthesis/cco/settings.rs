@@ -58,9 +58,9 @@ pub struct CcoSettings {
     /// Units: tissue lengths. Limits: ≥ 0. Default: 0.
     pub border_distance: f32,
     /// Number N_con of nearest segments to which a new terminal may be connected. It is doubled while none of them can
-    /// be, up to [`Self::MOST_DOUBLINGS`] times.
+    /// be, up to [`Self::MOST_DOUBLINGS`] times; then another place is drawn.
     ///
-    /// Higher values give slightly smaller trees, and take longer.
+    /// Higher values compare more connections, and take longer.
     ///
     /// Limits: 1 to 1000. Default: [`Self::DEFAULT_CANDIDATES`].
     pub candidates: u32,
@@ -81,7 +81,7 @@ impl CcoSettings {
     /// Default number of terminals of OpenCCO.
     pub const DEFAULT_TERMINALS: u32 = 1000;
     /// Most terminals of one kind.
-    pub const MAX_TERMINALS: u32 = 100_000_000;
+    pub const MAX_TERMINALS: u32 = 10_000_000;
     /// Perfusion area or volume of OpenCCO, in mm² or mm³.
     pub const DEFAULT_PERFUSION: f32 = 20_000.0;
     /// γ of OpenCCO.

@@ -1,13 +1,14 @@
 //! Where new terminals may be: places that are far enough from all others.
 //!
-//! OpenCCO draws blindly, keeps a draw that is farther from all terminals than a threshold, and multiplies the threshold
-//! by 0.9 after so many draws in vain (section 3.3.2, algorithms 2 and 3). In a tissue that fills, nearly all draws are
-//! in vain. Here they come from cells without a terminal. A cell's diagonal is the threshold, so one with a terminal has no
-//! room for another, and one that is fully covered is dropped. The threshold only ever falls, by the same factor.
+//! OpenCCO draws blindly, keeps a draw that is farther from all terminals than a threshold, and multiplies the
+//! threshold by 0.9 after so many draws in vain (section 3.3.2, algorithms 2 and 3). In a tissue that fills, nearly all
+//! draws are in vain. Here they come from cells without a terminal. A cell's diagonal is the threshold, so one with a
+//! terminal has no room for another, and one that is fully covered is dropped. The threshold only ever falls, by the
+//! same factor.
 
 use super::{cell_map::CellMap, domain::Domain};
 use crate::synthesis::random::VesselRng;
-use bevy_math::DVec3;
+use bevy_math::{DVec3, Vec3};
 use rand::RngExt;
 
 /// Factor of the threshold after draws in vain: α of the paper.
@@ -16,8 +17,9 @@ const FALL: f64 = 0.9;
 const TRIES: u32 = 100;
 /// Neighbours of a cell along an axis that the threshold reaches, the nearest first.
 const OFFSETS: [i64; 5] = [0, 1, -1, 2, -2];
-/// The threshold falls no lower than this share of a terminal's own size.
-const LEAST_SHARE: f64 = 0.02;
+/// The threshold falls no lower than this share of a terminal's own size, far below what terminals need that are drawn
+/// at random: there is no room if none is found by then.
+const LEAST_SHARE: f64 = 0.3;
 
 /// The places for terminals of one kind.
 #[derive(Clone, Debug)]
@@ -31,7 +33,7 @@ pub(super) struct Vacancy {
     vacant: Vec<u32>,
     /// Terminals by their cells.
     taken: CellMap,
-    terminals: Vec<bevy_math::Vec3>,
+    terminals: Vec<Vec3>,
     /// Places in vain in a row.
     failed: u32,
 }
@@ -55,21 +57,30 @@ impl Vacancy {
         vacancy
     }
 
-    /// Lists all cells anew for the present threshold.
-    fn rebuild(&mut self, domain: &Domain) {
+    /// Sets the size of cells for the present threshold.
+    fn divide(&mut self, domain: &Domain) {
         self.side = self.threshold / f64::from(domain.dimension).sqrt();
         self.size = domain.sides.to_array().map(|side| (side / self.side).ceil().max(1.0) as u64);
+    }
+
+    fn cells(&self) -> u64 {
+        self.size.iter().fold(1, |cells, &count| cells.saturating_mul(count))
+    }
+
+    /// Lists all cells anew for the present threshold.
+    fn rebuild(&mut self, domain: &Domain) {
+        self.divide(domain);
         self.taken.clear();
         for number in 0..self.terminals.len() {
             let cell = self.cell(domain, self.terminals[number].as_dvec3());
             self.taken.get_or_insert(cell, number as u32);
         }
         self.vacant.clear();
-        let cells = self.size.iter().product::<u64>().min(u64::from(u32::MAX));
-        for cell in 0..cells {
-            let center = self.at(domain, cell, DVec3::splat(0.5));
-            if self.taken.get(cell).is_none() && domain.may_be_within(center, 0.5 * self.threshold) {
-                self.vacant.push(cell as u32);
+        for cell in 0..self.cells() as u32 {
+            let number = u64::from(cell);
+            let center = self.at(domain, number, DVec3::splat(0.5));
+            if self.taken.get(number).is_none() && domain.may_be_within(center, 0.5 * self.threshold) {
+                self.vacant.push(cell);
             }
         }
     }
@@ -123,7 +134,9 @@ impl Vacancy {
             }
             self.threshold *= FALL;
             self.failed = 0;
-            if self.threshold < self.least {
+            self.divide(domain);
+            // More cells than can be counted are hundreds for each terminal, even in a thin organ.
+            if self.threshold < self.least || self.cells() > u32::MAX.into() {
                 return None;
             }
             self.rebuild(domain);
