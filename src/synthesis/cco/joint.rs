@@ -14,6 +14,11 @@ use bevy_math::{DMat3, DVec3};
 
 /// Most steps of the search. Newton's method takes three to five.
 const MOST_STEPS: usize = 100;
+/// Length of a segment, as a share of the longest, below which a joint counts as at an end.
+const AT_END: f64 = 2.0e-3;
+/// Steps at an end after which the search is over: the best place is the end itself, where the volume has a cusp, and the
+/// joint will be refused since a segment is too short.
+const STEPS_AT_END: usize = 10;
 /// Halvings of a step that does not lower the volume.
 const HALVINGS: usize = 12;
 /// Least length of a segment, as a share of the joint's size: a pull has no direction at its end.
@@ -87,7 +92,7 @@ impl Joint {
     pub(super) fn settle(&self, start: DVec3, slope: &Slope, tolerance: f64) -> DVec3 {
         let cost = |sums: &JointSums| slope.load * sums.trunk.load + slope.volume * sums.trunk.volume;
         let (mut place, mut sums) = (start, self.sums(start));
-        let mut least = cost(&sums);
+        let (mut least, mut steps_at_end) = (cost(&sums), 0);
         for _ in 0..MOST_STEPS {
             let Some(Step { way, plain, gain, scale }) = self.step(place, &sums, slope) else { break };
             if gain <= tolerance * scale {
@@ -99,6 +104,11 @@ impl Joint {
                 tries.map(|step| (place + step, self.sums(place + step))).find(|(_, there)| cost(there) < least);
             let Some((next, there)) = found else { break };
             (place, sums, least) = (next, there, cost(&there));
+            let (shortest, longest) = sums.lengths.iter().fold((f64::MAX, 0.0f64), |(a, b), &l| (a.min(l), b.max(l)));
+            steps_at_end += usize::from(shortest < AT_END * longest);
+            if steps_at_end > STEPS_AT_END {
+                break;
+            }
         }
         place
     }

@@ -46,7 +46,8 @@ fn the_place_of_least_volume_is_that_of_a_dense_search() {
         let best = dense(&joint);
         let excess = volume(&joint, found) / volume(&joint, best) - 1.0;
         // At an end, where a segment vanishes, there is nothing to be found: such candidates are too short.
-        let is_at_end = ends.iter().any(|end| end.distance(best) < 1e-3);
+        let longest = ends.iter().map(|end| end.distance(best)).fold(0.0, f64::max);
+        let is_at_end = ends.iter().any(|end| end.distance(best) < AT_END * longest);
         at_ends += usize::from(is_at_end);
         worst = worst.max(excess);
         if is_at_end {
