@@ -110,13 +110,11 @@ impl Domain {
 
     /// Bounds of the depth of a point: equal, unless they are on one side of `need`.
     fn depth_bounds(&self, point: DVec3, need: f64) -> [f64; 2] {
-        if let Some(grid) = &self.grid {
-            if let Some([least, most]) = grid.bounds(point.as_vec3()) {
-                let slack = 0.25 * f64::from(grid.cell);
-                if least > need + slack || most < need {
-                    return [least, most];
-                }
-            }
+        if let Some(grid) = &self.grid
+            && let Some([least, most]) = grid.bounds(point.as_vec3())
+            && (least > need + 0.25 * f64::from(grid.cell) || most < need)
+        {
+            return [least, most];
         }
         let depth = self.searched(point);
         [depth, depth]

@@ -7,16 +7,16 @@
 //! Every terminal has the same flow and pressure, so radii follow from the tree: they are those at which blood reaches
 //! all terminals with one loss of pressure, and obey Murray's law. To add a terminal,
 //!
-//! 1. a place far from all other terminals is drawn from vacant cells ([`vacancy`]),
-//! 2. each of the nearest segments is split at the place of least volume of the whole tree ([`joint`], [`candidates`]),
-//! 3. the cheapest of them that has room is taken ([`clearance`], [`domain`]).
+//! 1. a place far from all other terminals is drawn from vacant cells (`vacancy`),
+//! 2. each of the nearest segments is split at the place of least volume of the whole tree (`joint`, `candidates`),
+//! 3. the cheapest of them that has room is taken (`clearance`, `domain`).
 //!
-//! At the end, all bifurcations are moved to the best place under the final flows ([`polish`]). In contrast to
-//! OpenCCO, no two segments of any trees overlap at any time, unless they share a node, and every segment keeps its
-//! whole width inside the tissue, except where a vessel enters at its root.
+//! At the end, and whenever the number of terminals has doubled, all bifurcations are moved to the best place under the
+//! present flows (`polish`). In contrast to OpenCCO, no two segments of any trees overlap at any time, unless they share
+//! a node, and every segment keeps its whole width inside the tissue, except where a vessel enters at its root.
 //!
 //! The domain grows with the number of terminals, as in section 3.3.1. Only radii depend on its size, by one common
-//! factor, so positions never change.
+//! factor, so its growth moves nothing.
 
 mod candidates;
 mod cell_map;

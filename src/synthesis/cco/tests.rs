@@ -84,8 +84,9 @@ fn branch_and_bound_chooses_as_a_full_evaluation_does() {
 fn sums_anew(space: &Space) -> Vec<(f64, Sums)> {
     fn of(forest: &Forest, node: u32, found: &mut Vec<(f64, Sums)>) {
         let own = forest.node(node);
-        let children = own.children.map(|child| (child != NONE).then(|| of(forest, child, found)));
-        _ = children;
+        for child in own.children.into_iter().filter(|&child| child != NONE) {
+            of(forest, child, found);
+        }
         let below = match own.children {
             [NONE, _] => Below::default(),
             [a, b] => Below::join(&found[a as usize].1, &found[b as usize].1, forest.exponent),
