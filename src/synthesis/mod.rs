@@ -5,7 +5,8 @@
 //! 1. An organ's [`mesh`] becomes a [`tissue`]: its surface, its volume, or both in turn, with guides and a density.
 //!    The tissue may also be a plain shape or a mask.
 //! 2. [`roots`] say where vessels enter it.
-//! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`](tree::murray).
+//! 3. [`colonization`] samples the tissue for drains and grows the trees towards them, by the laws in [`murray`](tree::murray);
+//!    or [`cco`] adds terminal after terminal, each where the tree stays smallest.
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
 //! 5. [`haemodynamics`] computes blood flow, [`wound`] cuts vessels, [`binding`] moves them with a deforming organ.
 //!
@@ -49,7 +50,9 @@
 //! ```
 
 pub mod binding;
+pub mod cco;
 pub mod colonization;
+mod exponential;
 pub mod generator;
 pub mod growth;
 pub mod haemodynamics;

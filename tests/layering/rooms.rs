@@ -13,9 +13,9 @@ const PARTS: &str = "
 /// Floors of the pure half, the highest first. A room uses the floors below it, and on its own floor the rooms to its left.
 const FLOORS: &str = "
  products       haemodynamics  wound  instances  surface  binding  io
- makers         growth  colonization  generator  preset
+ makers         growth  colonization  cco  generator  preset
  input          mesh  organ  tree  segment_index  tissue  roots
- ground         units  pace  random  parallel  space
+ ground         units  pace  exponential  random  parallel  space
 ";
 
 /// Rooms of the plugin, in the order of the data, each with the rooms that it uses. All of them may use the ground.

@@ -42,7 +42,6 @@ pub mod blood_volume;
 mod circuit;
 pub mod clotting;
 mod error;
-mod exponential;
 mod gaps;
 mod interruption;
 pub mod ischaemia;

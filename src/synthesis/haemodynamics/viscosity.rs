@@ -4,11 +4,11 @@
 //! Gessner, Sperandio, Gross and Gaehtgens, "Resistance to blood flow in microvessels in vivo", Circulation Research 75
 //! (1994), the relation in vivo.
 
-use super::{
-    FlowError,
+use super::FlowError;
+use crate::synthesis::{
     exponential::{exp, exp_m1, ln},
+    units::{PLASMA_VISCOSITY, Viscosity, WHOLE_BLOOD_VISCOSITY},
 };
-use crate::synthesis::units::{PLASMA_VISCOSITY, Viscosity, WHOLE_BLOOD_VISCOSITY};
 
 /// How viscosity depends on a vessel's diameter.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -21,6 +21,8 @@ pub enum Stream {
     Organ = 3,
     /// Monte-Carlo measures of a finished tree, such as coverage.
     Statistics = 4,
+    /// Terminals of constrained constructive optimisation.
+    Terminals = 5,
 }
 
 impl Stream {

@@ -105,6 +105,19 @@ pub trait Tissue: Debug + Send + Sync {
     /// The point of the tissue nearest to `point`: `point` itself if the tissue contains it.
     fn closest_point(&self, point: Vec3) -> TissuePoint;
 
+    /// Distance of a point from the border of an area or a volume: positive inside, negative outside.
+    ///
+    /// It may be less than the distance, never more, and changes by no more than the way between two points. `None` for
+    /// a tissue without an inside, such as a curved surface or a curve, and for one that doesn't know its border.
+    fn depth(&self, _point: Vec3) -> Option<f32> {
+        None
+    }
+
+    /// Whether [`depth`](Self::depth) searches, so that a caller with many points should keep a grid of it.
+    fn depth_is_searched(&self) -> bool {
+        false
+    }
+
     /// Draws one candidate for an attraction point, uniformly by length, area or volume.
     ///
     /// `None` if this draw failed: it fell beside the tissue, its density field rejected it, or the tissue has no size.

@@ -239,6 +239,15 @@ impl Tissue for MeshVolume {
         TissuePoint { position, normal: Vec3::ZERO }
     }
 
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        let distance = self.index.closest(point)?.distance_squared.sqrt();
+        Some(if self.contains(point) { distance } else { -distance })
+    }
+
+    fn depth_is_searched(&self) -> bool {
+        true
+    }
+
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         let voxels = self.whole.len() + self.touched_voxels();
         for _ in 0..Self::TRIES {

@@ -56,6 +56,14 @@ impl Tissue for NoGoTissue {
         self.tissue.closest_point(point)
     }
 
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        self.tissue.depth(point)
+    }
+
+    fn depth_is_searched(&self) -> bool {
+        self.tissue.depth_is_searched()
+    }
+
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         let point = self.tissue.sample(rng);
         self.allowed(point)

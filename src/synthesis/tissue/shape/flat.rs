@@ -91,6 +91,10 @@ impl Tissue for Disc {
         TissuePoint { position, normal: self.normal }
     }
 
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        Some(self.radius - self.local(point).0.length())
+    }
+
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         Some(self.at(in_unit_disc(rng)? * self.radius))
     }
@@ -221,6 +225,12 @@ impl Tissue for Rectangle {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         TissuePoint { position: self.nearest(point), normal: self.normal() }
+    }
+
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        let offset = point - self.center;
+        let local = Vec2::new(offset.dot(self.axes[0]), offset.dot(self.axes[1]));
+        Some((self.half - local.abs()).min_element())
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {

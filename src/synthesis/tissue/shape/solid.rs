@@ -67,6 +67,10 @@ impl Tissue for Ball {
         inside(self.center + (point - self.center).clamp_length_max(self.radius))
     }
 
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        Some(self.radius - point.distance(self.center))
+    }
+
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         Some(self.center + in_unit_ball(rng)? * self.radius)
     }
@@ -113,6 +117,10 @@ impl Tissue for Cuboid {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         inside(self.center + (point - self.center).clamp(-self.half, self.half))
+    }
+
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        Some((self.half - (point - self.center).abs()).min_element())
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
@@ -166,6 +174,16 @@ impl Tissue for Ellipsoid {
         inside(self.center + nearest_on_ellipsoid((point - self.center).as_dvec3(), self.half.as_dvec3()).as_vec3())
     }
 
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        let half = self.half.as_dvec3();
+        // Off the planes of symmetry, on which the nearest point may not be unique.
+        let offset = (point - self.center).as_dvec3().abs().max(OFF_PLANE * half);
+        let distance = nearest_on_ellipsoid(offset, half).distance(offset);
+        let is_inside = (offset / half).length_squared() <= 1.0;
+        // The shift off the planes must not make it more.
+        Some((if is_inside { distance } else { -distance } - OFF_PLANE * half.length()) as f32)
+    }
+
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         // A uniform distribution stays uniform when stretched.
         Some(self.center + in_unit_ball(rng)? * self.half)
@@ -176,15 +194,19 @@ impl Tissue for Ellipsoid {
     }
 }
 
-/// The point of an ellipsoid around the origin that is nearest to a point outside it.
+/// Distance, in half axes, that a point keeps from the planes of symmetry of an ellipsoid when its depth is measured.
+const OFF_PLANE: f64 = 1.0e-7;
+
+/// The point of an ellipsoid around the origin that is nearest to a point outside it, or to one inside that is on none
+/// of the planes of symmetry.
 ///
 /// It is x = e²·p / (t + e²) for the t that satisfies F(t) = Σ (e·p / (t + e²))² − 1 = 0 (Eberly, "Distance from a
-/// Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid", 2013). Outside, t is above 0, where F is decreasing and
-/// convex, so Newton's steps from below never overshoot.
+/// Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid", 2013). Outside, t is above 0; inside, it is above −e² for
+/// the least e. There F is decreasing and convex, so Newton's steps from below never overshoot.
 fn nearest_on_ellipsoid(point: DVec3, half: DVec3) -> DVec3 {
     let squares = half * half;
     // At this t one term is already 1, so F is not below 0.
-    let mut t = (half * point.abs() - squares).max_element().max(0.0);
+    let mut t = (half * point.abs() - squares).max_element();
     for _ in 0..100 {
         let ratios = half * point / (squares + t);
         let value = ratios.length_squared() - 1.0;

@@ -6,7 +6,7 @@
 use bevy_math::ops;
 
 /// e^x. Overflows to infinity above 709 and falls to 0 below −708.
-pub(super) fn exp(x: f64) -> f64 {
+pub(crate) fn exp(x: f64) -> f64 {
     if !(x < 709.0) {
         return if x.is_nan() { x } else { f64::INFINITY };
     }
@@ -23,7 +23,7 @@ pub(super) fn exp(x: f64) -> f64 {
 }
 
 /// e^x − 1, accurate near 0, too.
-pub(super) fn exp_m1(x: f64) -> f64 {
+pub(crate) fn exp_m1(x: f64) -> f64 {
     if x.abs() < 0.35 { small_exp_m1(x) } else { exp(x) - 1.0 }
 }
 
@@ -45,7 +45,7 @@ const INVERSE_FACTORIALS: [f64; 14] = {
 };
 
 /// The natural logarithm of a positive number within the range of `f32`.
-pub(super) fn ln(x: f64) -> f64 {
+pub(crate) fn ln(x: f64) -> f64 {
     let guess = f64::from(ops::ln(x as f32));
     // One step of Halley's method, from 7 digits to all of them.
     let y = exp(guess);

@@ -1,0 +1,207 @@
+//! Which segment a new terminal joins: the one that makes the smallest tree.
+//!
+//! As in sections 4.3 to 4.5 of the paper, the nearest segments are candidates, each gets the best place for a
+//! bifurcation, and the one with the least volume of the whole tree is taken. The paper does all that for every
+//! candidate, and tests it for intersections. Here each gets a lower bound of its cost first, from one look at it. The
+//! best place is searched for, and room looked for, in the order of bounds and costs, until one candidate is connected:
+//! the same choice (branch and bound).
+
+use super::{
+    distance::squared_to_segment,
+    forest::NONE,
+    joint::Joint,
+    paths::Paths,
+    space::Space,
+    sums::{Below, Slope},
+};
+use bevy_math::DVec3;
+
+/// How much more a search may gain than its first step promises, for a bound. A test compares the choices with those of
+/// full searches.
+const PROMISE: f64 = 4.0;
+
+/// A way to connect a terminal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Candidate {
+    /// The segment to be split.
+    pub segment: u32,
+    /// Where it is split.
+    pub place: DVec3,
+    /// Volume that it adds, over π and the square of the radius of a load of 1.
+    pub cost: f64,
+}
+
+/// A segment that a terminal may join, whose best place is not known yet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guess {
+    segment: u32,
+    joint: Joint,
+    slope: Slope,
+    /// Less than what it costs.
+    bound: f64,
+}
+
+/// What is known of a candidate.
+#[derive(Clone, Copy, Debug)]
+enum Rank {
+    Guessed(Guess),
+    Known(Candidate),
+}
+
+impl Rank {
+    /// The least cost that it may have, and its segment, which decides between equals.
+    fn key(&self) -> (f64, u32) {
+        match self {
+            Self::Guessed(guess) => (guess.bound, guess.segment),
+            Self::Known(candidate) => (candidate.cost, candidate.segment),
+        }
+    }
+}
+
+/// Finds candidates, and keeps the buffers for them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Candidates {
+    /// Distance within which enough segments are expected.
+    reach: f64,
+    found: Vec<(f64, u32)>,
+    ranks: Vec<Rank>,
+    paths: Paths,
+}
+
+/// How an attempt to connect a terminal ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Attempt {
+    Connected,
+    /// None of the candidates had room.
+    Failed,
+    /// No segment is left, or the place is within a vessel.
+    Hopeless,
+}
+
+impl Candidates {
+    /// The nearest segments to a point, of trees that `may_join` accepts: at most `count`, the nearest first.
+    fn nearest(&mut self, space: &Space, point: DVec3, count: usize, may_join: impl Fn(u32) -> bool) {
+        let most = space.domain.diagonal();
+        self.reach = if self.reach > 0.0 { self.reach } else { 0.1 * most };
+        loop {
+            let (found, square) = (&mut self.found, self.reach * self.reach);
+            found.clear();
+            space.index.near(point, point, self.reach, |segment| {
+                let node = space.forest.node(segment);
+                if may_join(node.tree) {
+                    let distance = squared_to_segment(point, space.forest.place(node.parent), node.at.as_dvec3());
+                    if distance <= square {
+                        found.push((distance, segment));
+                    }
+                }
+                true
+            });
+            if found.len() >= count || self.reach >= most {
+                break;
+            }
+            self.reach *= 1.25;
+        }
+        // In trees that become denser, the reach follows.
+        if 2 * self.found.len() > 3 * count {
+            self.reach *= 0.95;
+        }
+        self.found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        self.found.truncate(count);
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.paths.bytes()
+    }
+
+    /// Connects a point to the best of its `count` nearest segments that has room. The first `known` have none.
+    pub(super) fn connect(
+        &mut self,
+        space: &mut Space,
+        point: DVec3,
+        [known, count]: [usize; 2],
+        tolerance: f64,
+        may_join: impl Fn(u32) -> bool,
+    ) -> Attempt {
+        self.nearest(space, point, count, may_join);
+        let is_within = |&(square, segment): &(f64, u32)| {
+            let bound = f64::from(space.forest.node(segment).bound);
+            square < bound * bound && square.sqrt() < space.radius(segment)
+        };
+        if self.found.len() <= known || known == 0 && self.found.iter().any(is_within) {
+            return Attempt::Hopeless;
+        }
+        self.ranks.clear();
+        self.paths.clear(&space.forest);
+        for &(_, segment) in &self.found[known..] {
+            self.ranks.push(Rank::Guessed(space.guess(segment, point, &mut self.paths)));
+        }
+        // The least bound or cost comes next: a cost below all bounds is the least cost.
+        while let Some(best) = (0..self.ranks.len()).min_by(|&a, &b| {
+            let (a, b) = (self.ranks[a].key(), self.ranks[b].key());
+            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+        }) {
+            match self.ranks[best] {
+                Rank::Guessed(guess) => match space.search(&guess, tolerance) {
+                    Some(candidate) => self.ranks[best] = Rank::Known(candidate),
+                    None => drop(self.ranks.swap_remove(best)),
+                },
+                Rank::Known(candidate) => {
+                    if space.connect(&candidate, point) {
+                        return Attempt::Connected;
+                    }
+                    self.ranks.swap_remove(best);
+                }
+            }
+        }
+        Attempt::Failed
+    }
+}
+
+impl Space {
+    /// Bounds what it costs to connect a point to a segment.
+    pub(super) fn guess(&self, segment: u32, point: DVec3, paths: &mut Paths) -> Guess {
+        let (forest, node) = (&self.forest, self.forest.node(segment));
+        debug_assert!(node.parent != NONE);
+        let joint = Joint {
+            ends: [forest.place(node.parent), node.at.as_dvec3(), point],
+            flows: [node.flow, 1.0],
+            below: [node.below(forest.exponent), Below::default()],
+            exponent: forest.exponent,
+        };
+        let start = joint.start();
+        let (volume, slope) = paths.ascend(forest, segment, joint.sums(start).trunk);
+        let before = forest.node(self.root_segment(node.tree)).sums.volume;
+        let bound = volume - before - PROMISE * joint.promise(start, &slope);
+        Guess { segment, joint, slope, bound: if bound.is_finite() { bound } else { f64::NEG_INFINITY } }
+    }
+
+    /// The best way to connect a point to a segment; `None` if the new segments would be too short for their radii.
+    pub(super) fn search(&self, guess: &Guess, tolerance: f64) -> Option<Candidate> {
+        let Guess { segment, joint, slope, .. } = guess;
+        let (forest, node) = (&self.forest, self.forest.node(*segment));
+        // Rounded, as it will be kept.
+        let place = joint.settle(joint.start(), slope, tolerance).as_vec3().as_dvec3();
+        let sums = joint.sums(place);
+        let ascent = forest.ascend(*segment, sums.trunk, 1.0);
+        let trunk = self.unit[node.tree as usize] * ascent.root.load * ascent.thinning;
+        let child = |child: usize| trunk * sums.children[child].load / sums.below.load;
+        // 2r ≤ l, as fourth powers.
+        let is_long = |(fourth, length): (f64, f64)| 16.0 * fourth <= (length * length) * (length * length);
+        let before = forest.node(self.root_segment(node.tree)).sums.volume;
+        let cost = ascent.root.volume - before;
+        let are_long = [trunk, child(0), child(1)].into_iter().zip(sums.lengths).all(is_long);
+        (are_long && cost.is_finite()).then_some(Candidate { segment: *segment, place, cost })
+    }
+
+    /// Connects a terminal as a candidate says, if there is room; otherwise nothing is changed.
+    pub(super) fn connect(&mut self, candidate: &Candidate, terminal: DVec3) -> bool {
+        self.begin();
+        let [joint, end] = self.split(candidate.segment, candidate.place, terminal);
+        let has_room = !self.domain.is_forbidden(candidate.place) && self.has_room(&[joint, candidate.segment, end]);
+        if !has_room {
+            self.undo();
+        }
+        has_room
+    }
+}

@@ -1,0 +1,159 @@
+//! No two segments of any trees overlap, unless they share a node, and none leaves the tissue.
+//!
+//! A new terminal changes the radii of all segments of its tree a little, so a look at the new ones is not enough.
+//! Every segment has a *bound*: a radius that it may have without touching others at theirs, or the border. Each
+//! subtree keeps its *strain*, the largest ratio of radius to bound in it, for a radius of 1 at its top. If the root's
+//! radius times the root's strain is at most 1, all segments of the tree are within their bounds: one comparison for a
+//! million segments. Otherwise the strains lead to those that are not. They get wider bounds, if their neighbours leave
+//! room.
+//!
+//! A bound is 5 % above the radius, so a segment is looked at again only after it grew by that. If two bounds leave no
+//! room between two segments while their radii do, both bounds are drawn in.
+
+use super::{
+    distance::squared_between,
+    forest::NONE,
+    space::{SLACK, Space},
+};
+
+/// Least distance between two segments, as a multiple of the sum of their radii. It is above 1 by more than the
+/// rounding of a tree in f32.
+const APART: f64 = 1.0 + 2.0e-6;
+/// Least length of a new segment, in radii.
+const LEAST_LENGTH: f64 = 2.0;
+
+impl Space {
+    /// Whether the segments of a change, which are in the index, and all others whose radii it changed have room. If
+    /// so, all bounds and strains are up to date.
+    pub(super) fn has_room(&mut self, changed: &[u32]) -> bool {
+        for &segment in changed {
+            if !self.clear(segment, self.reserve) {
+                return false;
+            }
+        }
+        // From the ends up: the joint is the first of them.
+        for &segment in changed.iter().rev() {
+            let strain = self.forest.strain_of(segment);
+            self.change(segment).strain = strain;
+        }
+        let Some(&top) = changed.first() else { return true };
+        self.strain_above(top);
+        self.fit(self.forest.node(top).tree)
+    }
+
+    /// Whether a segment is long enough for its radius, or at least as long as before.
+    pub(super) fn is_long_enough(&self, segment: u32, before: f64) -> bool {
+        let length = self.forest.node(segment).length;
+        length >= LEAST_LENGTH * self.radius(segment) || length >= before
+    }
+
+    /// Brings every segment of a tree within its bound.
+    fn fit(&mut self, tree: u32) -> bool {
+        let root = self.root_segment(tree);
+        let radius = self.radius(root);
+        if radius * self.forest.node(root).strain <= 1.0 {
+            return true;
+        }
+        let (mut wide, mut stack) = (std::mem::take(&mut self.wide), std::mem::take(&mut self.stack));
+        wide.clear();
+        stack.clear();
+        stack.push((root, radius));
+        while let Some((segment, radius)) = stack.pop() {
+            let node = self.forest.node(segment);
+            if radius * node.strain <= 1.0 {
+                continue;
+            }
+            if radius > f64::from(node.bound) {
+                wide.push(segment);
+            }
+            let children = node.children.iter().filter(|&&child| child != NONE);
+            stack.extend(children.map(|&child| (child, radius * self.forest.thinning(child).sqrt().sqrt())));
+        }
+        let fits = wide.iter().all(|&segment| {
+            let fits = self.clear(segment, 1.0);
+            if fits {
+                self.strain_from(segment);
+            }
+            fits
+        });
+        (self.wide, self.stack) = (wide, stack);
+        fits
+    }
+
+    /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room for
+    /// radii that are `reserve` times as wide.
+    fn clear(&mut self, segment: u32, reserve: f64) -> bool {
+        let radius = self.radius(segment);
+        let parent = self.forest.node(segment).parent;
+        let ends = [self.forest.place(parent), self.forest.place(segment)];
+        let is_entrance = self.forest.node(parent).parent == NONE;
+        let mut bound = SLACK * radius;
+        if !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
+            bound = radius * APART;
+            if !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
+                return false;
+            }
+        }
+        let mut tightened = std::mem::take(&mut self.tightened);
+        tightened.clear();
+        let mut has_room = true;
+        self.index.near(ends[0], ends[1], bound, |other| {
+            if other == segment || self.forest.are_incident(segment, other) {
+                return true;
+            }
+            let node = self.forest.node(other);
+            let other_ends = [self.forest.place(node.parent), node.at.as_dvec3()];
+            let sum = bound + f64::from(node.bound);
+            let square = squared_between(ends, other_ends);
+            if square >= sum * sum {
+                return true;
+            }
+            let (distance, other_radius) = (square.sqrt(), self.radius(other));
+            let spare = distance - APART * (radius + other_radius);
+            if spare < 0.0 || distance < reserve * (radius + other_radius) {
+                has_room = false;
+                return false;
+            }
+            // Half of the room for each, but no bound becomes wider.
+            let other_bound = (APART * other_radius + 0.5 * spare).min(node.bound.into());
+            tightened.push((other, other_bound as f32));
+            bound = bound.min(distance - other_bound);
+            true
+        });
+        if has_room {
+            // Rounded down, so that a bound never takes what it was not given; APART leaves room for that.
+            self.change(segment).bound = (bound * (1.0 - 1.0e-7)) as f32;
+            self.index.refit(&self.forest, segment);
+            for &(other, bound) in &tightened {
+                let node = self.change(other);
+                node.bound = node.bound.min(bound);
+                self.strain_from(other);
+            }
+        }
+        self.tightened = tightened;
+        has_room
+    }
+
+    /// Carries the strain of a changed segment up to the root. All radii on the way have changed.
+    fn strain_above(&mut self, segment: u32) {
+        let mut parent = self.forest.node(segment).parent;
+        while self.forest.node(parent).parent != NONE {
+            let strain = self.forest.strain_of(parent);
+            self.change(parent).strain = strain;
+            parent = self.forest.node(parent).parent;
+        }
+    }
+
+    /// Carries a changed bound up, as far as it changes any strain. A strain on the path of a change is not up to date
+    /// yet, but will be.
+    fn strain_from(&mut self, mut segment: u32) {
+        while self.forest.node(segment).parent != NONE {
+            let strain = self.forest.strain_of(segment);
+            if strain == self.forest.node(segment).strain {
+                return;
+            }
+            self.change(segment).strain = strain;
+            segment = self.forest.node(segment).parent;
+        }
+    }
+}

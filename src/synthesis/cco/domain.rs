@@ -1,0 +1,219 @@
+//! The tissue as a domain: how deep a point lies, and whether a segment stays inside.
+//!
+//! Depths of a mesh are searched for, so the domain keeps them at the centres of a grid. A depth changes by no more
+//! than the way between two points, so a value at a centre bounds those around it from both sides; only where the bound
+//! does not decide, near the border, the mesh is asked.
+
+use super::error::CcoError;
+use crate::synthesis::{
+    parallel,
+    tissue::{Extent, Tissue},
+};
+use bevy_math::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// Cells of the grid along the longest side of the tissue.
+const RESOLUTION: f32 = 128.0;
+/// Those of the coarse grid that tells where a finer one is of use.
+const COARSE: f32 = 24.0;
+/// Excess of depth, as a share of what is needed, at which a segment that is traced counts as inside. It is the least
+/// step of the trace, too.
+const MARGIN: f64 = 0.01;
+
+/// A tissue with a border.
+#[derive(Clone, Debug)]
+pub(super) struct Domain {
+    tissue: Arc<dyn Tissue>,
+    /// 2 for an area, 3 for a volume.
+    pub dimension: u32,
+    /// Area or volume.
+    pub measure: f64,
+    /// Lowest corner of a box around the tissue, along [`axes`](Self::axes).
+    pub corner: DVec3,
+    /// Perpendicular unit vectors, the last of which is an area's normal.
+    pub axes: [DVec3; 3],
+    /// Sides of that box; the last is 0 for an area.
+    pub sides: DVec3,
+    border: f64,
+    grid: Option<DepthGrid>,
+}
+
+/// Depths at the centres of cells.
+#[derive(Clone, Debug)]
+struct DepthGrid {
+    corner: Vec3,
+    cell: f32,
+    size: [usize; 3],
+    depths: Vec<f32>,
+}
+
+impl Domain {
+    /// A tissue whose vessels keep so far from its border.
+    ///
+    /// # Errors
+    /// A tissue without an inside.
+    pub(super) fn new(tissue: Arc<dyn Tissue>, border: f32) -> Result<Self, CcoError> {
+        if tissue.stage(1).is_some() {
+            return Err(CcoError::NoInside { tissue: "a tissue in stages" });
+        }
+        let bounds = tissue.bounds();
+        let (min, max) = (Vec3::from(bounds.min), Vec3::from(bounds.max));
+        let center = 0.5 * (min + max);
+        if tissue.depth(center).is_none() {
+            return Err(CcoError::NoInside {
+                tissue: match tissue.extent() {
+                    Extent::Length(_) => "a curve",
+                    Extent::Area(_) => "a curved surface, or an area whose border is not known,",
+                    Extent::Volume(_) => "a volume whose border is not known",
+                },
+            });
+        }
+        let (dimension, measure, axes) = match tissue.extent() {
+            Extent::Length(_) => return Err(CcoError::NoInside { tissue: "a curve" }),
+            Extent::Area(area) => {
+                let normal = tissue.closest_point(center).normal;
+                let (x, y) = normal.any_orthonormal_pair();
+                (2, f64::from(area), [x, y, normal].map(|axis| axis.as_dvec3()))
+            }
+            Extent::Volume(volume) => (3, f64::from(volume), DVec3::AXES),
+        };
+        // The box along the axes around all corners of the bounds.
+        let corners = (0..8).map(|corner: usize| {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { min[axis] } else { max[axis] };
+            let point = DVec3::new(pick(0).into(), pick(1).into(), pick(2).into());
+            DVec3::from_array(axes.map(|axis| axis.dot(point)))
+        });
+        let (low, high) = corners.fold((DVec3::MAX, DVec3::MIN), |(low, high), at| (low.min(at), high.max(at)));
+        let mut sides = high - low;
+        let mut low = low;
+        if dimension == 2 {
+            low.z = center.as_dvec3().dot(axes[2]);
+            sides.z = 0.0;
+        }
+        let corner = axes[0] * low.x + axes[1] * low.y + axes[2] * low.z;
+        let grid = tissue.depth_is_searched().then(|| DepthGrid::new(&*tissue, min, max));
+        Ok(Self { tissue, dimension, measure, corner, axes, sides, border: border.into(), grid })
+    }
+
+    pub(super) fn tissue(&self) -> &Arc<dyn Tissue> {
+        &self.tissue
+    }
+
+    /// The diagonal of the tissue's box.
+    pub(super) fn diagonal(&self) -> f64 {
+        self.sides.length()
+    }
+
+    fn searched(&self, point: DVec3) -> f64 {
+        self.tissue.depth(point.as_vec3()).map_or(f64::NEG_INFINITY, f64::from)
+    }
+
+    /// Bounds of the depth of a point: equal, unless they are on one side of `need`.
+    fn depth_bounds(&self, point: DVec3, need: f64) -> [f64; 2] {
+        if let Some(grid) = &self.grid
+            && let Some([least, most]) = grid.bounds(point.as_vec3())
+            && (least > need + 0.25 * f64::from(grid.cell) || most < need)
+        {
+            return [least, most];
+        }
+        let depth = self.searched(point);
+        [depth, depth]
+    }
+
+    /// Whether a point lies so deep in the tissue, and is not forbidden.
+    pub(super) fn holds_point(&self, point: DVec3, radius: f64) -> bool {
+        let need = radius + self.border;
+        self.depth_bounds(point, need)[0] >= need && !self.is_forbidden(point)
+    }
+
+    /// Whether a node may not be at a point.
+    pub(super) fn is_forbidden(&self, point: DVec3) -> bool {
+        self.tissue.no_go().is_some_and(|field| field.forbids(point.as_vec3()))
+    }
+
+    /// An upper bound of the depth of a point, and whether it may be reached by the tissue within `reach`.
+    pub(super) fn may_be_within(&self, point: DVec3, reach: f64) -> bool {
+        match self.grid.as_ref().and_then(|grid| grid.bounds(point.as_vec3())) {
+            Some([_, most]) => most >= -reach,
+            None => self.searched(point) >= -reach,
+        }
+    }
+
+    /// How deep a point lies, at least.
+    pub(super) fn depth(&self, point: DVec3) -> f64 {
+        self.searched(point)
+    }
+
+    /// Whether a segment of this radius is inside, with its distance from the border.
+    ///
+    /// A vessel enters the tissue at its root. So the segment from a root may be nearer to the border on its first
+    /// stretch, twice as long as what is needed.
+    pub(super) fn holds(&self, from: DVec3, to: DVec3, radius: f64, is_entrance: bool) -> bool {
+        let need = radius + self.border;
+        let length = from.distance(to);
+        let skipped = if is_entrance { (2.0 * need).min(length) } else { 0.0 };
+        // Sphere tracing: as deep as a point lies, so far along the segment nothing can be outside.
+        let middle = from.lerp(to, 0.5);
+        if self.depth_bounds(middle, need + 0.5 * length)[0] >= need + 0.5 * length {
+            return true;
+        }
+        let direction = (to - from) / length.max(f64::MIN_POSITIVE);
+        let enough = need * (1.0 + MARGIN);
+        let mut at = skipped;
+        loop {
+            let depth = self.depth_bounds(from + direction * at, enough)[0];
+            if depth < enough {
+                return false;
+            }
+            at += depth - need;
+            if at >= length {
+                // The end itself is a node, on which other segments rely.
+                return self.depth_bounds(to, enough)[0] >= enough;
+            }
+        }
+    }
+}
+
+impl DepthGrid {
+    /// Searches for depths inside and near the border; beyond, an upper bound by a coarse grid is enough.
+    fn new(tissue: &dyn Tissue, min: Vec3, max: Vec3) -> Self {
+        let search = |point| tissue.depth(point).unwrap_or(f32::NEG_INFINITY);
+        let coarse = Self::filled(min, max, COARSE, search);
+        let cell = (max - min).max_element() / RESOLUTION;
+        Self::filled(min, max, RESOLUTION, |point| match coarse.bounds(point) {
+            Some([_, most]) if most < f64::from(-2.0 * cell) => most as f32,
+            _ => search(point),
+        })
+    }
+
+    fn filled(min: Vec3, max: Vec3, resolution: f32, depth: impl Fn(Vec3) -> f32 + Sync) -> Self {
+        let cell = (max - min).max_element() / resolution;
+        let size = ((max - min) / cell).to_array().map(|count| (count.ceil() as usize).max(1));
+        let numbers: Vec<u32> = (0..(size[0] * size[1] * size[2]) as u32).collect();
+        let mut grid = Self { corner: min, cell, size, depths: Vec::new() };
+        let mut depths = Vec::new();
+        parallel::map_into(&numbers, &mut depths, 0.0, |&number| depth(grid.center(number as usize)));
+        grid.depths = depths;
+        grid
+    }
+
+    fn center(&self, number: usize) -> Vec3 {
+        let [x, y, _] = self.size;
+        let cell = Vec3::new((number % x) as f32, (number / x % y) as f32, (number / (x * y)) as f32);
+        self.corner + (cell + 0.5) * self.cell
+    }
+
+    /// The least and the largest depth that a point may have; `None` beside the grid.
+    fn bounds(&self, point: Vec3) -> Option<[f64; 2]> {
+        let local = (point - self.corner) / self.cell;
+        let cell = local.to_array().map(|value| value as usize);
+        let is_in = local.cmpge(Vec3::ZERO).all() && (0..3).all(|axis| cell[axis] < self.size[axis]);
+        if !is_in {
+            return None;
+        }
+        let number = (cell[2] * self.size[1] + cell[1]) * self.size[0] + cell[0];
+        let away = f64::from(point.distance(self.center(number)));
+        let depth = f64::from(self.depths[number]);
+        Some([depth - away, depth + away])
+    }
+}

@@ -1,0 +1,108 @@
+//! Why constrained constructive optimisation cannot start, or ended early.
+
+use crate::synthesis::{roots::RootError, tree::VesselKind};
+use bevy_math::Vec3;
+
+/// A setting with which growth cannot start.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CcoSettingsError {
+    /// A value outside its limits.
+    #[error("{name} is {value}; it must be {limits}")]
+    OutOfRange {
+        /// Name of the field.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+        /// What it may be.
+        limits: &'static str,
+    },
+    /// A count outside its limits.
+    #[error("{name} is {value}; it must be from {least} to {most}")]
+    Count {
+        /// Name of the field.
+        name: &'static str,
+        /// The value found.
+        value: u32,
+        /// The least count.
+        least: u32,
+        /// The largest count.
+        most: u32,
+    },
+    /// Pressures between which no blood flows.
+    #[error("root_pressure is {root} Pa and terminal_pressure {terminal} Pa; the root's must be above the terminals'")]
+    Pressures {
+        /// Pressure at the root, in pascals.
+        root: f64,
+        /// Pressure at the terminals, in pascals.
+        terminal: f64,
+    },
+}
+
+/// Why constrained constructive optimisation cannot start, or could not place all terminals.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CcoError {
+    /// A setting outside its limits.
+    #[error(transparent)]
+    Settings(#[from] CcoSettingsError),
+    /// Roots that do not fit the tissue.
+    #[error(transparent)]
+    Roots(#[from] RootError),
+    /// A tissue without an inside, or one that changes.
+    #[error(
+        "constrained constructive optimisation needs a flat area or a volume with a border, and {tissue} is neither; \
+         use the organ's volume, a shape or a mask, or space colonization"
+    )]
+    NoInside {
+        /// What the tissue is.
+        tissue: &'static str,
+    },
+    /// No kind of vessels has a root.
+    #[error("there is no root; place at least one")]
+    NoRoot,
+    /// A given tree, from which this generator cannot grow yet.
+    #[error("the {} vessels have a given tree; this generator grows from roots only: give it none", kind.name())]
+    GivenTree {
+        /// The kind in question.
+        kind: VesselKind,
+    },
+    /// Fewer terminals than roots.
+    #[error("{terminals} terminals are too few for {roots} roots of the {} vessels; each needs one", kind.name())]
+    MoreRootsThanTerminals {
+        /// The kind in question.
+        kind: VesselKind,
+        /// Terminals wanted.
+        terminals: u32,
+        /// Its roots.
+        roots: usize,
+    },
+    /// A root from which no first vessel fits into the tissue.
+    #[error(
+        "no vessel fits into the tissue from the {} root at {position}: it would have a radius of about \
+         {radius} tissue lengths; move the root, raise perfusion, or lower flow or border_distance",
+        kind.name()
+    )]
+    NoFirstVessel {
+        /// The kind in question.
+        kind: VesselKind,
+        /// The root.
+        position: Vec3,
+        /// Radius of the last vessel tried.
+        radius: f32,
+    },
+    /// Growth ended since no place for another terminal was found.
+    #[error(
+        "only {reached} of {wanted} {} terminals have room: the last {refused} places could not be connected; \
+         ask for fewer terminals, raise perfusion, or lower flow or border_distance",
+        kind.name()
+    )]
+    NoRoom {
+        /// The kind in question.
+        kind: VesselKind,
+        /// Terminals that were placed.
+        reached: u32,
+        /// Terminals wanted.
+        wanted: u32,
+        /// Places refused in a row.
+        refused: u32,
+    },
+}

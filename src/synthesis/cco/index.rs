@@ -1,0 +1,210 @@
+//! Where segments are: a hashed grid for each octave of their size.
+//!
+//! The size of a segment is its length and twice its bound. A segment lies in the grid whose cells are just as large or
+//! larger, in the cell of its middle, so that it reaches at most half a cell beyond. That finds long and thick vessels
+//! as surely as short ones, and every segment is stored once.
+
+use super::{
+    cell_map::CellMap,
+    forest::{Forest, NONE},
+};
+use bevy_math::DVec3;
+
+/// Grids. Up to four cells of the coarsest lie along each axis, so the finest has 2¹⁹ along it.
+const LEVELS: usize = 18;
+/// Bits of a coordinate in a cell's key.
+const BITS: u32 = 19;
+
+/// An index over the segments of a [`Forest`].
+#[derive(Clone, Debug)]
+pub(super) struct SegmentGrid {
+    origin: DVec3,
+    /// Side of the largest cell: no segment is larger.
+    side: f64,
+    /// The finest grid in use.
+    finest: usize,
+    /// Segments of each grid.
+    members: [Vec<u32>; LEVELS],
+    cells: CellMap,
+    /// First segment of each cell.
+    heads: Vec<u32>,
+    /// Next segment in the cell of each.
+    next: Vec<u32>,
+    /// Cell of each segment.
+    cell_of: Vec<u32>,
+    /// Grid of each segment.
+    level_of: Vec<u8>,
+    /// Place of each segment among the members of its grid.
+    place_of: Vec<u32>,
+}
+
+impl SegmentGrid {
+    /// An index over a box with this lowest corner, for segments up to `side` in size.
+    pub(super) fn new(origin: DVec3, side: f64) -> Self {
+        Self {
+            // One cell of margin for segments that reach beyond the box.
+            origin: origin - side,
+            side,
+            finest: LEVELS - 1,
+            members: Default::default(),
+            cells: CellMap::default(),
+            heads: Vec::new(),
+            next: Vec::new(),
+            cell_of: Vec::new(),
+            level_of: Vec::new(),
+            place_of: Vec::new(),
+        }
+    }
+
+    pub(super) fn reserve(&mut self, segments: usize) {
+        self.next.reserve_exact(segments);
+        self.cell_of.reserve_exact(segments);
+        self.level_of.reserve_exact(segments);
+        self.place_of.reserve_exact(segments);
+    }
+
+    fn cell_side(&self, level: usize) -> f64 {
+        self.side / (1u64 << level) as f64
+    }
+
+    /// Makes cells for new segments no smaller than this: searches reach so far that they would meet many of them.
+    pub(super) fn coarsen(&mut self, side: f64) {
+        self.finest = (0..LEVELS - 1).find(|&level| self.cell_side(level + 1) < side).unwrap_or(LEVELS - 1);
+    }
+
+    /// The finest grid in use whose cells are as large as a segment.
+    fn level(&self, size: f64) -> usize {
+        let mut level = 0;
+        while level < self.finest && self.cell_side(level + 1) >= size {
+            level += 1;
+        }
+        level
+    }
+
+    fn coordinates(&self, level: usize, point: DVec3) -> [i64; 3] {
+        ((point - self.origin) / self.cell_side(level)).to_array().map(|value| value.floor() as i64)
+    }
+
+    fn key(level: usize, cell: [i64; 3]) -> u64 {
+        let limit = (1i64 << BITS) - 1;
+        let [x, y, z] = cell.map(|value| value.clamp(0, limit) as u64);
+        (((level as u64) << BITS | x) << BITS | y) << BITS | z
+    }
+
+    fn size(forest: &Forest, segment: u32) -> f64 {
+        let node = forest.node(segment);
+        node.length + 2.0 * f64::from(node.bound)
+    }
+
+    /// Adds a segment, which must not be in the index.
+    pub(super) fn insert(&mut self, forest: &Forest, segment: u32) {
+        let slot = segment as usize;
+        if self.next.len() <= slot {
+            self.next.resize(slot + 1, NONE);
+            self.cell_of.resize(slot + 1, NONE);
+            self.level_of.resize(slot + 1, 0);
+            self.place_of.resize(slot + 1, 0);
+        }
+        let level = self.level(Self::size(forest, segment));
+        let middle = 0.5 * (forest.place(segment) + forest.place(forest.node(segment).parent));
+        let key = Self::key(level, self.coordinates(level, middle));
+        let cell = self.cells.get_or_insert(key, self.heads.len() as u32);
+        if cell as usize == self.heads.len() {
+            self.heads.push(NONE);
+        }
+        self.next[slot] = self.heads[cell as usize];
+        self.heads[cell as usize] = segment;
+        (self.cell_of[slot], self.level_of[slot]) = (cell, level as u8);
+        self.place_of[slot] = self.members[level].len() as u32;
+        self.members[level].push(segment);
+    }
+
+    /// Takes a segment out.
+    pub(super) fn remove(&mut self, segment: u32) {
+        let slot = segment as usize;
+        let cell = self.cell_of[slot] as usize;
+        let after = self.next[slot];
+        if self.heads[cell] == segment {
+            self.heads[cell] = after;
+        } else {
+            let mut at = self.heads[cell] as usize;
+            while self.next[at] != segment {
+                at = self.next[at] as usize;
+            }
+            self.next[at] = after;
+        }
+        let (members, place) = (&mut self.members[self.level_of[slot] as usize], self.place_of[slot]);
+        members.swap_remove(place as usize);
+        if let Some(&last) = members.get(place as usize) {
+            self.place_of[last as usize] = place;
+        }
+    }
+
+    /// Puts a segment into another grid if its bound has outgrown its cell.
+    pub(super) fn refit(&mut self, forest: &Forest, segment: u32) {
+        if Self::size(forest, segment) > self.cell_side(self.level_of[segment as usize].into()) {
+            self.remove(segment);
+            self.insert(forest, segment);
+        }
+    }
+
+    /// Visits every segment that may come within `reach` of the line between two points, some of them twice, until
+    /// `visit` returns false.
+    pub(super) fn near(&self, from: DVec3, to: DVec3, reach: f64, mut visit: impl FnMut(u32) -> bool) {
+        for level in (0..LEVELS).filter(|&level| !self.members[level].is_empty()) {
+            if !self.near_in(level, [from, to], reach, &mut visit) {
+                return;
+            }
+        }
+    }
+
+    fn near_in(&self, level: usize, [from, to]: [DVec3; 2], reach: f64, visit: &mut impl FnMut(u32) -> bool) -> bool {
+        let (way, side) = (to - from, self.cell_side(level));
+        let margin = reach + 0.5 * side;
+        // Along a line that is longer than a cell, piece by piece: its box would have too many cells.
+        let pieces = (way.length() / (2.0 * side).max(reach)).ceil().max(1.0);
+        let cells = |piece: f64| {
+            let [start, end] = [piece, piece + 1.0].map(|piece| from + way * (piece / pieces));
+            let first = self.coordinates(level, start.min(end) - margin);
+            (first, self.coordinates(level, start.max(end) + margin))
+        };
+        let (first, last) = cells(0.0);
+        let number = (0..3).map(|axis| (last[axis] - first[axis] + 1) as f64).product::<f64>() * pieces;
+        let members = &self.members[level];
+        if number > 2.0 * members.len() as f64 {
+            return members.iter().all(|&segment| visit(segment));
+        }
+        for piece in 0..pieces as u64 {
+            let (first, last) = cells(piece as f64);
+            for x in first[0]..=last[0] {
+                for y in first[1]..=last[1] {
+                    for z in first[2]..=last[2] {
+                        if !self.visit_cell(Self::key(level, [x, y, z]), visit) {
+                            return false;
+                        }
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    fn visit_cell(&self, key: u64, visit: &mut impl FnMut(u32) -> bool) -> bool {
+        let mut segment = self.cells.get(key).map_or(NONE, |cell| self.heads[cell as usize]);
+        while segment != NONE {
+            if !visit(segment) {
+                return false;
+            }
+            segment = self.next[segment as usize];
+        }
+        true
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.cells.bytes()
+            + 4 * (self.heads.capacity() + self.next.capacity() + self.cell_of.capacity() + self.place_of.capacity())
+            + 4 * self.members.iter().map(Vec::capacity).sum::<usize>()
+            + self.level_of.capacity()
+    }
+}

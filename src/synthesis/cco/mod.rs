@@ -1,0 +1,287 @@
+//! Constrained constructive optimisation: trees of least volume, one terminal at a time.
+//!
+//! In: a tissue with a border, flat or solid, roots, [`CcoSettings`] and a seed. Out: a
+//! [`VesselTree`](crate::synthesis::tree::VesselTree) for each kind of vessels that has a root. Source: Schreiner and
+//! Buxbaum 1993, Karch et al. 1999, in the form of OpenCCO (Kerautret et al., IPOL 2023).
+//!
+//! Every terminal has the same flow and pressure, so radii follow from the tree: they are those at which blood reaches
+//! all terminals with one loss of pressure, and obey Murray's law. To add a terminal,
+//!
+//! 1. a place far from all other terminals is drawn from vacant cells (`vacancy`),
+//! 2. each of the nearest segments is split at the place of least volume of the whole tree (`joint`, `candidates`),
+//! 3. the cheapest of them that has room is taken (`clearance`, `domain`).
+//!
+//! At the end, and whenever the number of terminals has doubled, all bifurcations are moved to the best place under the
+//! present flows (`polish`). In contrast to OpenCCO, no two segments of any trees overlap at any time, unless they share
+//! a node, and every segment keeps its whole width inside the tissue, except where a vessel enters at its root.
+//!
+//! The domain grows with the number of terminals, as in section 3.3.1. Only radii depend on its size, by one common
+//! factor, so its growth moves nothing.
+
+mod candidates;
+mod cell_map;
+mod clearance;
+mod distance;
+mod domain;
+mod error;
+mod forest;
+mod grown;
+mod index;
+mod joint;
+mod paths;
+mod polish;
+mod power;
+mod report;
+mod seam;
+mod settings;
+mod space;
+mod sums;
+mod system;
+#[cfg(test)]
+mod tests;
+mod vacancy;
+
+pub use error::{CcoError, CcoSettingsError};
+pub use report::CcoReport;
+pub use settings::CcoSettings;
+
+use crate::synthesis::{
+    growth::StepCount,
+    random::{Stream, VesselRng},
+    roots::Roots,
+    tissue::Tissue,
+    tree::{ByKind, VesselKind, VesselTree},
+};
+use domain::Domain;
+use forest::Forest;
+use grown::Grown;
+use power::Exponent;
+use space::Space;
+use std::sync::Arc;
+use system::System;
+
+/// Nodes that a step of polishing looks at.
+const POLISHED: u32 = 64;
+/// Number of nodes after which all bifurcations are polished for the first time. That is done again whenever the
+/// number has doubled, since later terminals join better trees then.
+const FIRST_SWEEP: usize = 64;
+/// Places that a step draws at most.
+const DRAWS: u32 = 8;
+
+/// A constrained constructive optimisation under way.
+///
+/// Make one with [`new`](Self::new), call [`advance`](Self::advance) until [`is_finished`](Self::is_finished), or
+/// [`run`](Self::run), and read the [`tree`](Self::tree) of a kind after [`settle`](Self::settle).
+///
+/// ```
+/// use bevy_vessels::synthesis::{
+///     cco::{Cco, CcoSettings},
+///     roots::{RootPlacement, RootPlacements},
+///     tissue::Disc,
+///     tree::VesselKind,
+/// };
+/// use bevy_math::Vec3;
+/// use std::sync::Arc;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let artery = RootPlacement::Nearest(vec![Vec3::Y * 50.0]);
+/// let roots = RootPlacements { artery, vein: RootPlacement::None, ..RootPlacements::default() };
+/// let settings = CcoSettings { terminals: 100, ..CcoSettings::default() };
+/// let mut growth = Cco::new(Arc::new(Disc::flat(50.0)?), settings, &roots.into(), 7)?;
+/// growth.run()?;
+/// assert_eq!(growth.tree(VesselKind::Artery).len(), 200);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Cco {
+    settings: CcoSettings,
+    space: Space,
+    systems: Vec<System>,
+    rng: VesselRng,
+    /// Terminals placed, and steps of polishing done.
+    steps: u32,
+    /// Node at which polishing goes on, and sweeps done at the end.
+    polished: [u32; 2],
+    /// Number of nodes from which on a sweep is due while the trees grow.
+    due: usize,
+    grown: ByKind<Option<Grown>>,
+}
+
+impl Cco {
+    /// Prepares a growth with the first vessel of each root. Lengths in the settings are the tissue's: see
+    /// [`CcoSettings::fit`].
+    ///
+    /// # Errors
+    /// A setting outside its limits; a tissue that is neither flat nor solid; roots that cannot be placed as requested,
+    /// that have no room for a vessel, or of which there are none.
+    pub fn new(tissue: Arc<dyn Tissue>, settings: CcoSettings, roots: &Roots, seed: u64) -> Result<Self, CcoError> {
+        settings.validate()?;
+        let domain = Domain::new(Arc::clone(&tissue), settings.border_distance)?;
+        for (kind, given) in roots.given.iter() {
+            if given.as_ref().is_some_and(|tree| !tree.is_empty()) {
+                return Err(CcoError::GivenTree { kind });
+            }
+        }
+        let spacing = settings.root_spacing(tissue.extent().equivalent_diameter());
+        let placed = roots.resolve(&*tissue, &spacing, seed)?;
+        let exponent = Exponent::new(settings.bifurcation_exponent.into());
+        let mut growth = Self {
+            space: Space::new(domain, Forest::new(exponent)),
+            systems: Vec::new(),
+            rng: Stream::Terminals.rng(seed),
+            steps: 0,
+            polished: [0; 2],
+            due: FIRST_SWEEP,
+            grown: ByKind::default(),
+            settings,
+        };
+        for (kind, roots) in placed.iter().filter(|(_, roots)| !roots.is_empty()) {
+            if roots.len() > growth.settings.terminals as usize {
+                let (terminals, roots) = (growth.settings.terminals, roots.len());
+                return Err(CcoError::MoreRootsThanTerminals { kind, terminals, roots });
+            }
+            growth.systems.push(System::new(kind, &growth.space.domain, &growth.settings));
+        }
+        if growth.systems.is_empty() {
+            return Err(CcoError::NoRoot);
+        }
+        let nodes = 2 * growth.settings.terminals as usize * growth.systems.len();
+        growth.space.forest.nodes.reserve_exact(nodes);
+        growth.space.index.reserve(nodes);
+        for system in &mut growth.systems {
+            for root in &placed[system.kind] {
+                system.plant(&mut growth.space, root.position, &growth.settings, &mut growth.rng)?;
+                growth.steps += 1;
+            }
+        }
+        growth.settle();
+        Ok(growth)
+    }
+
+    /// Does one step: connects the next terminal, of the kind that has fewest, or looks at some bifurcations once all
+    /// terminals are placed. Does nothing once growth is finished.
+    pub fn advance(&mut self) {
+        let is_growing = self.systems.iter().any(|system| !system.is_done(&self.settings));
+        if !is_growing || self.space.forest.nodes.len() >= self.due && self.settings.polish_sweeps > 0 {
+            return self.polish(is_growing);
+        }
+        for _ in 0..DRAWS {
+            let open = self.systems.iter_mut().filter(|system| !system.is_done(&self.settings));
+            let Some(system) = open.min_by_key(|system| system.terminals) else { return };
+            if system.advance(&mut self.space, &self.settings, &mut self.rng) {
+                self.steps += 1;
+                return;
+            }
+        }
+    }
+
+    fn polish(&mut self, is_growing: bool) {
+        if self.is_finished() {
+            return;
+        }
+        if !is_growing {
+            self.space.reserve = 1.0;
+        }
+        let nodes = self.space.forest.nodes.len();
+        let [node, sweeps] = &mut self.polished;
+        let end = (nodes as u32).min(*node + POLISHED);
+        for node in *node..end {
+            self.space.polish(node, self.settings.tolerance.into());
+        }
+        *node = end;
+        if end as usize == nodes {
+            *node = 0;
+            if is_growing {
+                self.due = 2 * nodes;
+            } else {
+                *sweeps += 1;
+            }
+        }
+        self.steps += 1;
+    }
+
+    /// Does all remaining steps, and settles.
+    ///
+    /// # Errors
+    /// [`CcoError::NoRoom`] if there was no room for all terminals. The trees with those that were placed stay.
+    pub fn run(&mut self) -> Result<(), CcoError> {
+        while !self.is_finished() {
+            self.advance();
+        }
+        self.settle();
+        self.outcome()
+    }
+
+    /// Whether all terminals are placed and all sweeps done, or no place for a terminal is left.
+    pub fn is_finished(&self) -> bool {
+        self.systems.iter().all(|system| system.is_done(&self.settings))
+            && self.polished[1] >= self.settings.polish_sweeps
+    }
+
+    /// Whether all has had room so far.
+    ///
+    /// # Errors
+    /// [`CcoError::NoRoom`] for the first kind that has no room for all its terminals.
+    pub fn outcome(&self) -> Result<(), CcoError> {
+        match self.systems.iter().find(|system| system.is_stuck) {
+            None => Ok(()),
+            Some(system) => Err(CcoError::NoRoom {
+                kind: system.kind,
+                reached: system.terminals,
+                wanted: self.settings.terminals,
+                refused: system.refused,
+            }),
+        }
+    }
+
+    /// Makes the [trees](Self::tree) of all that has grown. It takes time in proportion to the number of nodes, since a
+    /// new bifurcation comes between old nodes, and a tree is in the order from its root.
+    pub fn settle(&mut self) {
+        for system in &self.systems {
+            self.grown[system.kind].get_or_insert_default().settle(&self.space, &system.trees);
+        }
+    }
+
+    /// The steps done, and all of them: one for each terminal, and those of polishing.
+    pub fn steps(&self) -> StepCount {
+        let wanted = u64::from(self.settings.terminals) * self.systems.len() as u64;
+        // The sweeps while the trees grow look at about twice as many nodes as the last one.
+        let sweeps = match self.settings.polish_sweeps {
+            0 => 0,
+            sweeps => u64::from(sweeps) + 2,
+        };
+        let polishing = (2 * wanted).div_ceil(POLISHED.into()) * sweeps;
+        let all = u32::try_from(wanted + polishing).unwrap_or(u32::MAX);
+        StepCount { done: if self.is_finished() { all } else { self.steps.min(all) }, all }
+    }
+
+    /// Centre lines of a kind when it was [settled](Self::settle) last: an empty tree for kinds without a root.
+    ///
+    /// Radii are cylinders' radii in tissue lengths. A root node has that of its segment.
+    pub fn tree(&self, kind: VesselKind) -> &VesselTree {
+        static EMPTY: VesselTree = VesselTree::new();
+        self.grown[kind].as_ref().map_or(&EMPTY, |grown| &grown.tree)
+    }
+
+    /// What each kind has reached.
+    pub fn reports(&self) -> impl Iterator<Item = CcoReport> + '_ {
+        self.systems.iter().map(|system| system.report(&self.space, &self.settings))
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &CcoSettings {
+        &self.settings
+    }
+
+    /// The tissue of the growth.
+    pub fn tissue(&self) -> &Arc<dyn Tissue> {
+        self.space.domain.tissue()
+    }
+
+    /// Bytes of memory that grow with the number of terminals, without the settled trees.
+    pub fn bytes(&self) -> usize {
+        let nodes = self.space.forest.nodes.capacity() * size_of::<forest::Node>();
+        nodes + self.space.index.bytes() + self.systems.iter().map(System::bytes).sum::<usize>()
+    }
+}

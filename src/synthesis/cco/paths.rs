@@ -1,0 +1,78 @@
+//! Ways from candidates to the root, which they share.
+//!
+//! The candidates of a terminal lie near each other, so their ways meet soon. What one changes above that point is
+//! nearly what another does: the volume of the whole tree is taken to be linear there. That serves for a bound, not for
+//! a cost.
+
+use super::{
+    forest::{Forest, NONE},
+    sums::{Below, Slope, Sums},
+};
+
+/// What is known above a segment, for sums that it has if a terminal is added below it.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    segment: u32,
+    sums: Sums,
+    /// Volume of the whole tree then.
+    volume: f64,
+    /// How it depends on the sums.
+    slope: Slope,
+}
+
+/// The ways of the candidates of one terminal.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Paths {
+    steps: Vec<Step>,
+    /// For each segment, its step, if that has its number.
+    step_of: Vec<u32>,
+    /// Buffer: the way of one candidate up to another's, with the slopes from its beginning.
+    way: Vec<(u32, Sums, Slope)>,
+}
+
+impl Paths {
+    /// Forgets all ways, for another terminal.
+    pub(super) fn clear(&mut self, forest: &Forest) {
+        self.steps.clear();
+        if self.step_of.len() < forest.nodes.len() {
+            self.step_of.resize(forest.nodes.capacity(), 0);
+        }
+    }
+
+    fn step(&self, segment: u32) -> Option<&Step> {
+        self.steps.get(self.step_of[segment as usize] as usize).filter(|step| step.segment == segment)
+    }
+
+    /// Volume of the tree if a segment, which gains a terminal, had other sums, and how it depends on them.
+    pub(super) fn ascend(&mut self, forest: &Forest, mut segment: u32, mut sums: Sums) -> (f64, Slope) {
+        self.way.clear();
+        let mut slope = Slope::ROOT;
+        let (volume, whole) = loop {
+            if let Some(known) = self.step(segment) {
+                let load = known.slope.load * (sums.load - known.sums.load);
+                let own = known.slope.volume * (sums.volume - known.sums.volume);
+                break (known.volume + load + own, slope.then(&known.slope));
+            }
+            self.way.push((segment, sums, slope));
+            let parent = forest.node(segment).parent;
+            let node = forest.node(parent);
+            if node.parent == NONE {
+                break (sums.volume, slope);
+            }
+            let below = Below::join(&sums, &forest.node(forest.sister(segment)).sums, forest.exponent);
+            let above = Sums::of(node.flow + 1.0, node.length, &below, forest.exponent);
+            slope.rise(&sums, &below, &above);
+            (segment, sums) = (parent, above);
+        };
+        for &(segment, sums, below) in &self.way {
+            self.step_of[segment as usize] = self.steps.len() as u32;
+            self.steps.push(Step { segment, sums, volume, slope: whole.without(&below) });
+        }
+        (volume, whole)
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        4 * self.step_of.capacity()
+    }
+}

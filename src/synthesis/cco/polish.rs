@@ -1,0 +1,49 @@
+//! Moves every bifurcation to the place of least volume under the final flows.
+//!
+//! OpenCCO leaves a bifurcation where it was best when it was made. Sweeps over all bifurcations, each with the others
+//! as they are by then (Gauss–Seidel), take some per cent off the volume. A bifurcation moves only if there is room.
+
+use super::{forest::NONE, joint::Joint, space::Space};
+
+/// Shares of the way to the best place that are tried in turn, if there is no room at its end.
+const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
+/// Way to the best place, in lengths of the shortest of the three segments, below which a bifurcation stays.
+const STILL: f64 = 1.0e-4;
+
+impl Space {
+    /// Moves a node, if it is a bifurcation and the tree becomes smaller. Returns whether it moved.
+    pub(super) fn polish(&mut self, node: u32, tolerance: f64) -> bool {
+        let (forest, own) = (&self.forest, self.forest.node(node));
+        if own.parent == NONE || own.is_terminal() {
+            return false;
+        }
+        let children = own.children;
+        let joint = Joint {
+            ends: [forest.place(own.parent), forest.place(children[0]), forest.place(children[1])],
+            flows: children.map(|child| forest.node(child).flow),
+            below: children.map(|child| forest.node(child).below(forest.exponent)),
+            exponent: forest.exponent,
+        };
+        let (start, tree) = (own.at.as_dvec3(), own.tree);
+        let changed = [node, children[0], children[1]];
+        let lengths = changed.map(|segment| forest.node(segment).length);
+        let slope = forest.ascend(node, own.sums, 0.0).slope;
+        let best = joint.settle(start, &slope, tolerance);
+        if best.distance(start) < STILL * lengths.into_iter().fold(f64::MAX, f64::min) {
+            return false;
+        }
+        let before = self.forest.node(self.root_segment(tree)).sums.volume;
+        SHARES.into_iter().any(|share| {
+            let place = start.lerp(best, share).as_vec3().as_dvec3();
+            self.begin();
+            self.shift(node, place);
+            let is_smaller = self.forest.node(self.root_segment(tree)).sums.volume < before;
+            let are_long = || changed.iter().zip(lengths).all(|(&own, before)| self.is_long_enough(own, before));
+            let moves = is_smaller && are_long() && !self.domain.is_forbidden(place) && self.has_room(&changed);
+            if !moves {
+                self.undo();
+            }
+            moves
+        })
+    }
+}

@@ -1,0 +1,182 @@
+//! The trees of one kind of vessels, one new terminal at a time.
+
+use super::{
+    candidates::{Attempt, Candidates},
+    domain::Domain,
+    error::CcoError,
+    power::cube_root,
+    report::CcoReport,
+    settings::CcoSettings,
+    space::Space,
+    vacancy::Vacancy,
+};
+use crate::synthesis::{random::VesselRng, tree::VesselKind};
+use bevy_math::{DVec3, Vec3};
+use std::f64::consts::PI;
+
+/// Places from which the end of the first vessel is chosen.
+const FIRST_PLACES: usize = 64;
+/// Room for growth that the first segments get, as a share of their radii. Vessels that touch early are in the way of
+/// all later terminals, since trunks become wider with each.
+const RESERVE: f64 = 0.1;
+/// Places refused in a row after which a kind has no room for more.
+const MOST_REFUSED: u32 = 500;
+
+/// The trees of one kind.
+#[derive(Clone, Debug)]
+pub(super) struct System {
+    pub kind: VesselKind,
+    /// Numbers of its trees.
+    pub trees: Vec<u32>,
+    pub terminals: u32,
+    pub rejected: u64,
+    /// Places refused in a row.
+    pub refused: u32,
+    pub is_stuck: bool,
+    vacancy: Vacancy,
+    candidates: Candidates,
+    /// 8µQ/(πk·ΔP·s³): the unit of a radius's fourth power once the domain has its full size.
+    unit: f64,
+}
+
+impl System {
+    pub(super) fn new(kind: VesselKind, domain: &Domain, settings: &CcoSettings) -> Self {
+        // Millimetres of a tissue length in the full domain.
+        let share = f64::from(settings.perfusion) / domain.measure;
+        let scale = if domain.dimension == 2 { share.sqrt() } else { cube_root(share) };
+        let drop = settings.root_pressure.pascals() - settings.terminal_pressure.pascals();
+        // Flow in mm³/s.
+        let flow = settings.flow.cubic_metres_per_second() * 1.0e9 / f64::from(settings.terminals);
+        let unit = 8.0 * settings.viscosity.pascal_seconds() * flow / (PI * drop * scale * scale * scale);
+        Self {
+            kind,
+            trees: Vec::new(),
+            terminals: 0,
+            rejected: 0,
+            refused: 0,
+            is_stuck: false,
+            vacancy: Vacancy::new(domain, settings.terminals),
+            candidates: Candidates::default(),
+            unit,
+        }
+    }
+
+    /// The unit when the domain has grown for so many terminals: its measure is then n/k of the full one (Eq. 14).
+    fn unit_at(&self, domain: &Domain, terminals: u32, settings: &CcoSettings) -> f64 {
+        let share = f64::from(terminals.max(1)) / f64::from(settings.terminals);
+        // (n/k)^(−3/d)
+        let growth = if domain.dimension == 2 { (share * share * share).sqrt() } else { share };
+        self.unit / growth
+    }
+
+    fn set_unit(&self, space: &mut Space, unit: f64) {
+        for &tree in &self.trees {
+            space.unit[tree as usize] = unit;
+        }
+    }
+
+    /// Grows the first vessel of a root, to the deepest of some places to which one fits.
+    pub(super) fn plant(
+        &mut self,
+        space: &mut Space,
+        root: Vec3,
+        settings: &CcoSettings,
+        rng: &mut VesselRng,
+    ) -> Result<(), CcoError> {
+        let unit = self.unit_at(&space.domain, self.terminals + 1, settings);
+        let root = root.as_dvec3();
+        let mut places: Vec<(f64, DVec3)> = Vec::with_capacity(FIRST_PLACES);
+        for _ in 0..FIRST_PLACES {
+            let Some(place) = self.vacancy.draw(&space.domain, 0.0, rng) else { break };
+            places.push((space.domain.depth(place), place));
+        }
+        places.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut radius = 0.0;
+        for (_, place) in places {
+            space.begin();
+            let [_, segment] = space.plant(root, place, unit);
+            radius = space.radius(segment);
+            if space.is_long_enough(segment, f64::INFINITY) && space.has_room(&[segment]) {
+                self.trees.push(space.forest.node(segment).tree);
+                self.vacancy.take(&space.domain, place);
+                self.terminals += 1;
+                self.set_unit(space, unit);
+                return Ok(());
+            }
+            space.uproot();
+        }
+        Err(CcoError::NoFirstVessel { kind: self.kind, position: root.as_vec3(), radius: radius as f32 })
+    }
+
+    /// Whether nothing is left to do.
+    pub(super) fn is_done(&self, settings: &CcoSettings) -> bool {
+        self.is_stuck || self.terminals >= settings.terminals
+    }
+
+    /// Draws one place for a terminal and connects it, if that is possible. Returns whether it was.
+    pub(super) fn advance(&mut self, space: &mut Space, settings: &CcoSettings, rng: &mut VesselRng) -> bool {
+        let Some(place) = self.vacancy.draw(&space.domain, 0.0, rng) else {
+            self.is_stuck = true;
+            return false;
+        };
+        let (old, unit) =
+            (space.unit[self.trees[0] as usize], self.unit_at(&space.domain, self.terminals + 1, settings));
+        self.set_unit(space, unit);
+        space.index.coarsen(self.vacancy.threshold());
+        let share = f64::from(self.terminals) / f64::from(settings.terminals);
+        space.reserve = 1.0 + RESERVE * (1.0 - share);
+        if self.join(space, place, settings) {
+            self.vacancy.take(&space.domain, place);
+            self.terminals += 1;
+            self.refused = 0;
+            return true;
+        }
+        self.set_unit(space, old);
+        self.vacancy.refuse();
+        self.rejected += 1;
+        self.refused += 1;
+        self.is_stuck = self.refused >= MOST_REFUSED;
+        false
+    }
+
+    fn join(&mut self, space: &mut Space, place: DVec3, settings: &CcoSettings) -> bool {
+        let (mut known, mut count) = (0, settings.candidates as usize);
+        let (trees, tolerance) = (&self.trees, settings.tolerance.into());
+        for _ in 0..=CcoSettings::MOST_DOUBLINGS {
+            match self.candidates.connect(space, place, [known, count], tolerance, |tree| trees.contains(&tree)) {
+                Attempt::Connected => return true,
+                Attempt::Failed => (known, count) = (count, 2 * count),
+                Attempt::Hopeless => return false,
+            }
+        }
+        false
+    }
+
+    pub(super) fn report(&self, space: &Space, settings: &CcoSettings) -> CcoReport {
+        let mut report = CcoReport {
+            kind: self.kind,
+            terminals: self.terminals,
+            wanted: settings.terminals,
+            rejected: self.rejected,
+            volume: 0.0,
+            root_radius: 0.0,
+            is_stuck: self.is_stuck,
+        };
+        for &tree in &self.trees {
+            let root = space.root_segment(tree);
+            report.volume += PI * space.unit[tree as usize].sqrt() * space.forest.node(root).sums.volume;
+            report.root_radius = report.root_radius.max(space.radius(root));
+        }
+        report
+    }
+
+    /// The distance that terminals keep from each other now.
+    pub(super) fn spacing(&self) -> f64 {
+        self.vacancy.threshold()
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.vacancy.bytes() + self.candidates.bytes()
+    }
+}

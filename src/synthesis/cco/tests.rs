@@ -1,0 +1,130 @@
+//! The choice of a candidate, and the sums that it rests on, against plain computations.
+
+use super::{
+    candidates::{Attempt, Candidates},
+    distance::squared_to_segment,
+    domain::Domain,
+    forest::{Forest, NONE},
+    paths::Paths,
+    power::Exponent,
+    space::Space,
+    sums::{Below, Sums},
+};
+use crate::synthesis::{
+    random::Stream,
+    tissue::{Ball, Disc, Tissue},
+};
+use bevy_math::{DVec3, Vec3};
+use rand::RngExt;
+use std::sync::Arc;
+
+fn space(tissue: Arc<dyn Tissue>, gamma: f64, unit: f64) -> Space {
+    let domain = Domain::new(tissue, 0.0).expect("a domain");
+    let mut space = Space::new(domain, Forest::new(Exponent::new(gamma)));
+    space.begin();
+    let [_, segment] = space.plant(DVec3::Y * 0.5, DVec3::ZERO, unit);
+    assert!(space.has_room(&[segment]));
+    space
+}
+
+/// The best connection to the `count` nearest segments, each searched in full, and tried in the order of their costs.
+fn connect_by_brute_force(space: &mut Space, place: DVec3, count: usize) -> bool {
+    let forest = &space.forest;
+    let mut near: Vec<(f64, u32)> = (0..forest.nodes.len() as u32)
+        .filter(|&node| forest.node(node).parent != NONE)
+        .map(|node| (squared_to_segment(place, forest.place(forest.node(node).parent), forest.place(node)), node))
+        .collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    near.truncate(count);
+    let mut paths = Paths::default();
+    paths.clear(&space.forest);
+    let search = |&(_, segment): &(f64, u32)| space.search(&space.guess(segment, place, &mut paths), 1e-4);
+    let mut costs: Vec<_> = near.iter().filter_map(search).collect();
+    costs.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.segment.cmp(&b.segment)));
+    costs.iter().any(|candidate| space.connect(candidate, place))
+}
+
+#[test]
+fn branch_and_bound_chooses_as_a_full_evaluation_does() {
+    let cases: [(Arc<dyn Tissue>, bool); 2] = [
+        (Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball")), false),
+        (Arc::new(Disc::flat(0.5).expect("a disc")), true),
+    ];
+    for (tissue, is_flat) in cases {
+        for (gamma, unit) in [(3.0, 1e-12), (2.6, 1e-11)] {
+            let mut rng = Stream::Statistics.rng(5);
+            let (mut space, mut candidates, mut connected) =
+                (space(Arc::clone(&tissue), gamma, unit), Candidates::default(), 0);
+            for _ in 0..600 {
+                let mut place = tissue.sample(&mut rng).expect("a point").as_dvec3();
+                place.z = if is_flat { 0.0 } else { place.z };
+                let near = |node: u32| space.forest.place(node).distance(place) < 0.02;
+                if (0..space.forest.nodes.len() as u32).any(near) {
+                    continue;
+                }
+                let mut twin = space.clone();
+                let by_force = connect_by_brute_force(&mut twin, place, 20);
+                match candidates.connect(&mut space, place, [0, 20], 1e-4, |_| true) {
+                    // Such places are refused before anything is tried.
+                    Attempt::Hopeless => continue,
+                    attempt => assert_eq!(attempt == Attempt::Connected, by_force),
+                }
+                let shape = |space: &Space| -> Vec<_> {
+                    space.forest.nodes.iter().map(|node| (node.at.to_array(), node.parent, node.flow)).collect()
+                };
+                assert_eq!(shape(&space), shape(&twin));
+                connected += usize::from(by_force);
+            }
+            assert!(connected > 200, "only {connected} terminals were connected");
+        }
+    }
+}
+
+/// Sums of all segments, computed anew from the ends to the roots.
+fn sums_anew(space: &Space) -> Vec<(f64, Sums)> {
+    fn of(forest: &Forest, node: u32, found: &mut Vec<(f64, Sums)>) {
+        let own = forest.node(node);
+        for child in own.children.into_iter().filter(|&child| child != NONE) {
+            of(forest, child, found);
+        }
+        let below = match own.children {
+            [NONE, _] => Below::default(),
+            [a, b] => Below::join(&found[a as usize].1, &found[b as usize].1, forest.exponent),
+        };
+        let flow = if own.is_terminal() { 1.0 } else { own.children.map(|child| found[child as usize].0).iter().sum() };
+        let length = forest.place(node).distance(forest.place(own.parent));
+        found[node as usize] = (flow, Sums::of(flow, length, &below, forest.exponent));
+    }
+    let mut found = vec![(0.0, Sums::default()); space.forest.nodes.len()];
+    of(&space.forest, space.root_segment(0), &mut found);
+    found
+}
+
+#[test]
+fn sums_and_strains_stay_exact_through_changes_and_undoing() {
+    let tissue: Arc<dyn Tissue> = Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball"));
+    let (mut space, mut candidates, mut rng) =
+        (space(Arc::clone(&tissue), 3.0, 1e-12), Candidates::default(), Stream::Statistics.rng(8));
+    for round in 0..500 {
+        let place = tissue.sample(&mut rng).expect("a point").as_dvec3();
+        let before = space.forest.nodes.clone();
+        if candidates.connect(&mut space, place, [0, 10], 1e-4, |_| true) != Attempt::Connected {
+            for (now, before) in space.forest.nodes.iter().zip(&before) {
+                assert_eq!((now.sums, now.bound, now.strain), (before.sums, before.bound, before.strain));
+            }
+        }
+        if round % 3 == 0 {
+            space.polish(rng.random_range(0..space.forest.nodes.len() as u32), 1e-4);
+        }
+        let anew = sums_anew(&space);
+        for node in (0..space.forest.nodes.len() as u32).filter(|&node| space.forest.node(node).parent != NONE) {
+            let (own, (flow, sums)) = (space.forest.node(node), anew[node as usize]);
+            assert_eq!(own.flow, flow);
+            let close = |a: f64, b: f64| (a - b).abs() <= 1e-11 * b.abs();
+            assert!(close(own.sums.load, sums.load) && close(own.sums.volume, sums.volume), "{own:?} {sums:?}");
+            assert_eq!(own.strain, space.forest.strain_of(node), "node {node}");
+            assert!(space.radius(node) <= f64::from(own.bound), "node {node}");
+        }
+    }
+    assert!(space.forest.nodes.len() > 500);
+}

@@ -1,0 +1,207 @@
+//! Where new terminals may be: places that are far enough from all others.
+//!
+//! OpenCCO draws blindly, keeps a draw that is farther from all terminals than a threshold, and multiplies the
+//! threshold by 0.9 after so many draws in vain (section 3.3.2, algorithms 2 and 3). In a tissue that fills, nearly all
+//! draws are in vain. Here they come from cells without a terminal. A cell's diagonal is the threshold, so one with a
+//! terminal has no room for another, and one that is fully covered is dropped. The threshold only ever falls, by the
+//! same factor.
+
+use super::{cell_map::CellMap, domain::Domain};
+use crate::synthesis::random::VesselRng;
+use bevy_math::{DVec3, Vec3};
+use rand::RngExt;
+
+/// Factor of the threshold after draws in vain: α of the paper.
+const FALL: f64 = 0.9;
+/// Draws in vain in a row after which the threshold falls.
+const TRIES: u32 = 100;
+/// Neighbours of a cell along an axis that the threshold reaches, the nearest first.
+const OFFSETS: [i64; 5] = [0, 1, -1, 2, -2];
+/// The threshold falls no lower than this share of a terminal's own size, far below what terminals need that are drawn
+/// at random: there is no room if none is found by then.
+const LEAST_SHARE: f64 = 0.3;
+
+/// The places for terminals of one kind.
+#[derive(Clone, Debug)]
+pub(super) struct Vacancy {
+    threshold: f64,
+    least: f64,
+    side: f64,
+    /// Cells along each axis of the domain.
+    size: [u64; 3],
+    /// Cells in which there may be room.
+    vacant: Vec<u32>,
+    /// Terminals by their cells.
+    taken: CellMap,
+    terminals: Vec<Vec3>,
+    /// Places in vain in a row.
+    failed: u32,
+}
+
+impl Vacancy {
+    /// Room for so many terminals in an empty domain.
+    pub(super) fn new(domain: &Domain, terminals: u32) -> Self {
+        let threshold = size_of_share(domain, 1.0);
+        let mut vacancy = Self {
+            threshold,
+            least: LEAST_SHARE * size_of_share(domain, f64::from(terminals)),
+            side: 0.0,
+            size: [0; 3],
+            vacant: Vec::new(),
+            taken: CellMap::default(),
+            terminals: Vec::new(),
+            failed: 0,
+        };
+        vacancy.terminals.reserve_exact(terminals as usize);
+        vacancy.rebuild(domain);
+        vacancy
+    }
+
+    /// Sets the size of cells for the present threshold.
+    fn divide(&mut self, domain: &Domain) {
+        self.side = self.threshold / f64::from(domain.dimension).sqrt();
+        self.size = domain.sides.to_array().map(|side| (side / self.side).ceil().max(1.0) as u64);
+    }
+
+    fn cells(&self) -> u64 {
+        self.size.iter().fold(1, |cells, &count| cells.saturating_mul(count))
+    }
+
+    /// Lists all cells anew for the present threshold.
+    fn rebuild(&mut self, domain: &Domain) {
+        self.divide(domain);
+        self.taken.clear();
+        for number in 0..self.terminals.len() {
+            let cell = self.cell(domain, self.terminals[number].as_dvec3());
+            self.taken.get_or_insert(cell, number as u32);
+        }
+        self.vacant.clear();
+        for cell in 0..self.cells() as u32 {
+            let number = u64::from(cell);
+            let center = self.at(domain, number, DVec3::splat(0.5));
+            if self.taken.get(number).is_none() && domain.may_be_within(center, 0.5 * self.threshold) {
+                self.vacant.push(cell);
+            }
+        }
+    }
+
+    /// A point of a cell, from 0 to 1 along each axis.
+    fn at(&self, domain: &Domain, cell: u64, within: DVec3) -> DVec3 {
+        let [x, y, _] = self.size;
+        let first = DVec3::new((cell % x) as f64, (cell / x % y) as f64, (cell / (x * y)) as f64);
+        let mut local = (first + within) * self.side;
+        if domain.dimension == 2 {
+            local.z = 0.0;
+        }
+        domain.corner + domain.axes[0] * local.x + domain.axes[1] * local.y + domain.axes[2] * local.z
+    }
+
+    fn coordinates(&self, domain: &Domain, point: DVec3) -> [i64; 3] {
+        let offset = point - domain.corner;
+        let local = domain.axes.map(|axis| (axis.dot(offset) / self.side).floor() as i64);
+        [0, 1, 2].map(|axis| local[axis].clamp(0, self.size[axis] as i64 - 1))
+    }
+
+    fn number(&self, cell: [i64; 3]) -> u64 {
+        let [x, y, z] = cell.map(|value| value as u64);
+        (z * self.size[1] + y) * self.size[0] + x
+    }
+
+    fn cell(&self, domain: &Domain, point: DVec3) -> u64 {
+        self.number(self.coordinates(domain, point))
+    }
+
+    /// A place at least the threshold from all terminals, deeper in the domain than `radius`; `None` if the threshold
+    /// would become too small.
+    pub(super) fn draw(&mut self, domain: &Domain, radius: f64, rng: &mut VesselRng) -> Option<DVec3> {
+        loop {
+            while self.failed < TRIES && !self.vacant.is_empty() {
+                let slot = rng.random_range(0..self.vacant.len() as u32) as usize;
+                let cell = u64::from(self.vacant[slot]);
+                let within = DVec3::new(rng.random(), rng.random(), rng.random());
+                // Rounded, as it will be kept.
+                let point = self.at(domain, cell, within).as_vec3().as_dvec3();
+                match self.nearest(domain, point) {
+                    Some(nearest) => {
+                        if self.covers(domain, nearest, cell) {
+                            self.vacant.swap_remove(slot);
+                        }
+                        self.failed += 1;
+                    }
+                    None if domain.holds_point(point, radius) => return Some(point),
+                    None => self.failed += 1,
+                }
+            }
+            self.threshold *= FALL;
+            self.failed = 0;
+            self.divide(domain);
+            // More cells than can be counted are hundreds for each terminal, even in a thin organ.
+            if self.threshold < self.least || self.cells() > u32::MAX.into() {
+                return None;
+            }
+            self.rebuild(domain);
+        }
+    }
+
+    /// A terminal nearer to a point than the threshold.
+    fn nearest(&self, domain: &Domain, point: DVec3) -> Option<DVec3> {
+        let center = self.coordinates(domain, point);
+        let square = self.threshold * self.threshold;
+        let last = self.size.map(|count| count as i64 - 1);
+        // A cell's own terminal first, which is near in most cases.
+        for dz in OFFSETS {
+            for dy in OFFSETS {
+                for dx in OFFSETS {
+                    let cell = [center[0] + dx, center[1] + dy, center[2] + dz];
+                    if (0..3).any(|axis| cell[axis] < 0 || cell[axis] > last[axis]) {
+                        continue;
+                    }
+                    let Some(number) = self.taken.get(self.number(cell)) else { continue };
+                    let terminal = self.terminals[number as usize].as_dvec3();
+                    if terminal.distance_squared(point) < square {
+                        return Some(terminal);
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// Whether a terminal leaves no room in a cell.
+    fn covers(&self, domain: &Domain, terminal: DVec3, cell: u64) -> bool {
+        let corner = |bit: usize, axis: usize| f64::from((bit >> axis & 1) as u32);
+        (0..1 << domain.dimension).all(|bit: usize| {
+            let at = self.at(domain, cell, DVec3::new(corner(bit, 0), corner(bit, 1), corner(bit, 2)));
+            at.distance_squared(terminal) < self.threshold * self.threshold
+        })
+    }
+
+    /// Takes a place for a terminal.
+    pub(super) fn take(&mut self, domain: &Domain, place: DVec3) {
+        let cell = self.cell(domain, place);
+        self.taken.get_or_insert(cell, self.terminals.len() as u32);
+        self.terminals.push(place.as_vec3());
+        self.failed = 0;
+    }
+
+    /// Counts a place that could not be used.
+    pub(super) fn refuse(&mut self) {
+        self.failed += 1;
+    }
+
+    /// The distance that terminals keep from each other now.
+    pub(super) fn threshold(&self) -> f64 {
+        self.threshold
+    }
+
+    /// Bytes of memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.taken.bytes() + 4 * self.vacant.capacity() + 12 * self.terminals.capacity()
+    }
+}
+
+/// Side of the square or cube that is a share of the domain: δ_max of Eq. 15.
+fn size_of_share(domain: &Domain, shares: f64) -> f64 {
+    let measure = domain.measure / shares;
+    if domain.dimension == 2 { measure.sqrt() } else { super::power::cube_root(measure) }
+}

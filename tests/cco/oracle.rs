@@ -1,0 +1,152 @@
+//! Plain computations of what a tree must be.
+
+use bevy_math::DVec3;
+use bevy_vessels::synthesis::{
+    cco::Cco,
+    growth::Growth,
+    tree::{VesselKind, VesselTree},
+};
+
+/// Nodes with their two ends, radius and node numbers.
+struct Tube {
+    ends: [DVec3; 2],
+    radius: f64,
+    nodes: [usize; 2],
+    tree: usize,
+}
+
+fn tubes(growth: &Cco) -> Vec<Tube> {
+    let trees = VesselKind::ALL.map(|kind| growth.tree(kind));
+    let tubes_of = |(number, tree): (usize, &VesselTree)| {
+        let tube = |(node, parent): (usize, usize)| Tube {
+            ends: [parent, node].map(|node| tree.positions()[node].as_dvec3()),
+            radius: tree.radii()[node].into(),
+            nodes: [parent, node],
+            tree: number,
+        };
+        tree.segments().map(tube).collect::<Vec<_>>()
+    };
+    trees.into_iter().enumerate().flat_map(tubes_of).collect()
+}
+
+/// Least distance between two segments: of the ends of each from the other, or where their lines come nearest.
+fn distance(a: &Tube, b: &Tube) -> f64 {
+    let to = |point: DVec3, [from, to]: [DVec3; 2]| {
+        let way = to - from;
+        let share = ((point - from).dot(way) / way.length_squared()).clamp(0.0, 1.0);
+        (from + way * share).distance(point)
+    };
+    let ends = a.ends.map(|end| to(end, b.ends)).into_iter().chain(b.ends.map(|end| to(end, a.ends)));
+    let least = ends.fold(f64::MAX, f64::min);
+    let (u, v, w) = (a.ends[1] - a.ends[0], b.ends[1] - b.ends[0], b.ends[0] - a.ends[0]);
+    let normal = u.cross(v);
+    let square = normal.length_squared();
+    if square < 1e-18 * u.length_squared() * v.length_squared() {
+        return least;
+    }
+    let (s, t) = (w.cross(v).dot(normal) / square, w.cross(u).dot(normal) / square);
+    let inner = [s, t].into_iter().all(|share| (0.0..=1.0).contains(&share));
+    if inner { least.min(w.dot(normal).abs() / square.sqrt()) } else { least }
+}
+
+/// No two segments without a common node overlap, by comparing all with all.
+pub fn check_overlaps(name: &str, growth: &Cco) {
+    let tubes = tubes(growth);
+    for (number, a) in tubes.iter().enumerate() {
+        for b in &tubes[..number] {
+            let is_joined = a.tree == b.tree && a.nodes.iter().any(|node| b.nodes.contains(node));
+            if is_joined || a.ends[0].distance(b.ends[0]) > length(a) + length(b) + a.radius + b.radius {
+                continue;
+            }
+            let (distance, radii) = (distance(a, b), a.radius + b.radius);
+            assert!(distance >= radii, "{name}: {:?} and {:?} overlap: {distance} < {radii}", a.nodes, b.nodes);
+        }
+    }
+}
+
+fn length(tube: &Tube) -> f64 {
+    tube.ends[0].distance(tube.ends[1])
+}
+
+/// All that holds for every tree.
+pub fn check(name: &str, growth: &Cco) {
+    check_overlaps(name, growth);
+    for report in growth.reports() {
+        let tree = growth.tree(report.kind);
+        tree.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
+        let gamma = growth.settings().bifurcation_exponent;
+        let residual = tree.murray_residual(gamma);
+        assert!(residual <= 1e-6, "{name}: Murray's residual is {residual}");
+        check_flow(name, growth, tree);
+        let volume: f64 = tree
+            .segments()
+            .map(|(node, parent)| {
+                let length = f64::from(tree.positions()[node].distance(tree.positions()[parent]));
+                std::f64::consts::PI * f64::from(tree.radii()[node]).powi(2) * length
+            })
+            .sum();
+        assert!((volume / report.volume - 1.0).abs() < 1e-5, "{name}: volume {volume}, reported {}", report.volume);
+        assert!((f64::from(tree.widest_radius()) / report.root_radius - 1.0).abs() < 1e-6);
+        assert_eq!(tree.tips().len(), report.terminals as usize, "{name}");
+    }
+    check_inside(name, growth);
+}
+
+/// Blood that enters at the root's pressure, and leaves equally from all terminals, arrives at each with the terminals'
+/// pressure: Poiseuille's law along every way, with radii and lengths in millimetres.
+fn check_flow(name: &str, growth: &Cco, tree: &VesselTree) {
+    let settings = growth.settings();
+    let extent = growth.tissue().extent();
+    let share = f64::from(settings.perfusion);
+    let scale = match extent {
+        bevy_vessels::synthesis::tissue::Extent::Volume(volume) => (share / f64::from(volume)).cbrt(),
+        bevy_vessels::synthesis::tissue::Extent::Area(area) => (share / f64::from(area)).sqrt(),
+        bevy_vessels::synthesis::tissue::Extent::Length(_) => unreachable!("it has no inside"),
+    };
+    let mut terminals = vec![0u32; tree.len()];
+    for tip in tree.tips().into_iter().map(|tip| tip as usize) {
+        terminals[tip] = 1;
+    }
+    for node in (0..tree.len()).rev() {
+        if let Some(parent) = tree.parent(bevy_vessels::synthesis::tree::NodeId(node as u32)) {
+            terminals[parent.index()] += terminals[node];
+        }
+    }
+    let all: u32 = tree.roots().map(|root| terminals[root]).sum();
+    assert_eq!(all, settings.terminals, "{name}");
+    let flow = settings.flow.cubic_metres_per_second() * 1e9 / f64::from(settings.terminals);
+    let mut pressures = vec![settings.root_pressure.pascals(); tree.len()];
+    for (node, parent) in tree.segments() {
+        let length = f64::from(tree.positions()[node].distance(tree.positions()[parent])) * scale;
+        let radius = f64::from(tree.radii()[node]) * scale;
+        let resistance = 8.0 * settings.viscosity.pascal_seconds() * length / (std::f64::consts::PI * radius.powi(4));
+        pressures[node] = pressures[parent] - resistance * flow * f64::from(terminals[node]);
+    }
+    let expected = settings.terminal_pressure.pascals();
+    let drop = settings.root_pressure.pascals() - expected;
+    for tip in tree.tips().into_iter().map(|tip| tip as usize) {
+        let error = (pressures[tip] - expected).abs() / drop;
+        assert!(error <= 1e-3, "{name}: terminal {tip} has {} Pa instead of {expected}", pressures[tip]);
+    }
+}
+
+/// Every segment keeps its whole width inside, by points along it. A root's may be nearer to the border where it
+/// enters.
+fn check_inside(name: &str, growth: &Cco) {
+    let tissue = growth.tissue();
+    let trees: Vec<&VesselTree> = VesselKind::ALL.iter().map(|&kind| growth.tree(kind)).collect();
+    for tube in tubes(growth) {
+        let is_entrance = trees[tube.tree].parents()[tube.nodes[0]] == bevy_vessels::synthesis::tree::NO_PARENT;
+        let need = tube.radius + f64::from(growth.settings().border_distance);
+        for step in 0..=20 {
+            let share = f64::from(step) / 20.0;
+            if is_entrance && share * length(&tube) < 2.0 * need {
+                continue;
+            }
+            let depth = f64::from(tissue.depth(tube.ends[0].lerp(tube.ends[1], share).as_vec3()).expect("a depth"));
+            assert!(depth >= need * (1.0 - 1e-5), "{name}: {:?} is {depth} deep, not {need}", tube.nodes);
+        }
+    }
+    let grown = growth.trees();
+    assert!(VesselKind::ALL.iter().all(|&kind| grown[kind].is_none_or(|grown| grown.waiting == 0)), "{name}");
+}
