@@ -113,6 +113,8 @@ fn ladder(report: &SurfaceReport) -> Vec<(&'static str, usize)> {
         ("joined", report.joined),
         ("shortened", report.shortened),
         ("moved", report.moved),
+        ("remade", report.remade.len()),
+        ("left", report.left.len()),
         ("absorbed", report.absorbed.len()),
     ]
 }

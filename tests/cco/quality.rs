@@ -57,10 +57,10 @@ fn compare(is_flat: bool, (terminals, volume, radius): (u32, f64, f64)) {
 
 #[test]
 fn trees_in_a_disc_are_no_larger_than_those_of_opencco() {
-    DISC.map(|case| compare(true, case));
+    DISC.into_iter().for_each(|case| compare(true, case));
 }
 
 #[test]
 fn trees_in_a_ball_are_no_larger_than_those_of_opencco() {
-    BALL.map(|case| compare(false, case));
+    BALL.into_iter().for_each(|case| compare(false, case));
 }

@@ -145,7 +145,10 @@ fn share_of(level: usize, levels: usize) -> Range<f32> {
 fn name_whole_nodes(surface: &mut Surface, remains: &Remains) {
     let whole = |node: u32| remains.places.get(node as usize).map_or(node, |place| place.node.0);
     surface.mesh.nodes.iter_mut().for_each(|node| *node = whole(*node));
-    surface.report.absorbed.iter_mut().for_each(|node| *node = NodeId(whole(node.0)));
+    let report = &mut surface.report;
+    for nodes in [&mut report.remade, &mut report.left, &mut report.absorbed] {
+        nodes.iter_mut().for_each(|node| *node = NodeId(whole(node.0)));
+    }
 }
 
 #[cfg(test)]

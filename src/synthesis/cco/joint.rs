@@ -1,9 +1,9 @@
 //! A bifurcation, and the place where it costs least.
 //!
 //! Source: Kamiya & Togawa, "Optimal branching structure of the vascular tree" (1972), as OpenCCO uses it (section 3.2,
-//! Eq. 9 to 13). Its Eq. 13 says that at the best place the three ends pull equally: Σ r_i²·(p_i − x)/l_i = 0, where
-//! r_i² is the volume per length of a segment whose radius stays. But radii change with lengths, along the whole path
-//! to the root. Here the pull of an end is the exact derivative c_i of the whole tree's volume by the length of its
+//! Eq. 9 to 13). Its Eq. 13 says that at the best place the three ends pull equally: `Σ r_i²·(p_i − x)/l_i = 0`, where
+//! `r_i²` is the volume per length of a segment whose radius stays. But radii change with lengths, along the whole path
+//! to the root. Here the pull of an end is the exact derivative `c_i` of the whole tree's volume by the length of its
 //! segment, so that the solution is a minimum of the volume itself.
 
 use super::{

@@ -31,7 +31,7 @@ pub struct CcoSettings {
     ///
     /// Units: mm² or mm³. Limits: > 0. Default: [`Self::DEFAULT_PERFUSION`].
     pub perfusion: f32,
-    /// Exponent γ of Murray's law, r_p^γ = r_l^γ + r_r^γ.
+    /// Exponent γ of Murray's law, `r_p^γ = r_l^γ + r_r^γ`.
     ///
     /// Higher values make parents thinner relative to their children.
     ///
@@ -45,11 +45,11 @@ pub struct CcoSettings {
     ///
     /// Limits: > 0. Default: [`Self::DEFAULT_FLOW`].
     pub flow: Flow,
-    /// Pressure P_in at the root: the higher end of the pressure loss, in whichever direction blood flows.
+    /// Pressure `P_in` at the root: the higher end of the pressure loss, in whichever direction blood flows.
     ///
     /// Limits: above [`terminal_pressure`](Self::terminal_pressure). Default: [`Self::DEFAULT_ROOT_PRESSURE`].
     pub root_pressure: Pressure,
-    /// Pressure P_out at every terminal. The nearer it is to the root's, the wider are the vessels.
+    /// Pressure `P_out` at every terminal. The nearer it is to the root's, the wider are the vessels.
     ///
     /// Limits: below [`root_pressure`](Self::root_pressure). Default: [`Self::DEFAULT_TERMINAL_PRESSURE`].
     pub terminal_pressure: Pressure,
@@ -57,7 +57,7 @@ pub struct CcoSettings {
     ///
     /// Units: tissue lengths. Limits: ≥ 0. Default: 0.
     pub border_distance: f32,
-    /// Number N_con of nearest segments to which a new terminal may be connected. It is doubled while none of them can
+    /// Number `N_con` of nearest segments to which a new terminal may be connected. It is doubled while none of them can
     /// be, up to [`Self::MOST_DOUBLINGS`] times; then another place is drawn.
     ///
     /// Higher values compare more connections, and take longer.
@@ -90,11 +90,11 @@ impl CcoSettings {
     pub const DEFAULT_VISCOSITY: Viscosity = Viscosity::from_centipoise(3.6);
     /// Q of OpenCCO: 8330 mm³/s.
     pub const DEFAULT_FLOW: Flow = Flow::from_cubic_metres_per_second(8.33e-6);
-    /// P_in of OpenCCO: 13,300 Pa, which is 100 mmHg.
+    /// `P_in` of OpenCCO: 13,300 Pa, which is 100 mmHg.
     pub const DEFAULT_ROOT_PRESSURE: Pressure = Pressure::from_pascals(13_300.0);
-    /// P_out of OpenCCO for more than 250 terminals, 7980 Pa. For fewer it takes 8400 Pa.
+    /// `P_out` of OpenCCO for more than 250 terminals, 7980 Pa. For fewer it takes 8400 Pa.
     pub const DEFAULT_TERMINAL_PRESSURE: Pressure = Pressure::from_pascals(7980.0);
-    /// N_con of OpenCCO.
+    /// `N_con` of OpenCCO.
     pub const DEFAULT_CANDIDATES: u32 = 20;
     /// How often the number of candidates is doubled for one terminal.
     pub const MOST_DOUBLINGS: u32 = 1;

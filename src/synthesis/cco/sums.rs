@@ -5,11 +5,11 @@
 //! has if blood loses one unit of pressure on the way through its subtree. Children lose the same pressure, so their
 //! radii at a bifurcation are in the ratio of their X^¼ (Eq. 4), and by Murray's law
 //!
-//! - Yᵢ = (X_a^(γ/4) + X_b^(γ/4))^(4/γ) is what the bifurcation below the segment adds,
+//! - Yᵢ = (`X_a^(γ/4)` + `X_b^(γ/4))^(4/γ`) is what the bifurcation below the segment adds,
 //! - Xᵢ = fᵢ·lᵢ + Yᵢ,
-//! - β_a = (X_a / Yᵢ)^¼.
+//! - `β_a = (X_a / Yᵢ)^¼`.
 //!
-//! The volume of the subtree over π at this loss of pressure is Wᵢ = √Xᵢ·(lᵢ + (W_a + W_b)/√Yᵢ). So a changed segment
+//! The volume of the subtree over π at this loss of pressure is `Wᵢ = √Xᵢ·(lᵢ + (W_a + W_b)/√Yᵢ)`. So a changed segment
 //! changes two numbers in each segment on its path to the root, and the tree is never copied.
 //!
 //! Flows are in numbers of terminals, lengths in tissue lengths.

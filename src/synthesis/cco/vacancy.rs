@@ -200,7 +200,7 @@ impl Vacancy {
     }
 }
 
-/// Side of the square or cube that is a share of the domain: δ_max of Eq. 15.
+/// Side of the square or cube that is a share of the domain: `δ_max` of Eq. 15.
 fn size_of_share(domain: &Domain, shares: f64) -> f64 {
     let measure = domain.measure / shares;
     if domain.dimension == 2 { measure.sqrt() } else { super::power::cube_root(measure) }

@@ -141,8 +141,7 @@ impl<'a> Builder<'a> {
             self.report.moved += if row.is_moved() { count } else { 0 };
         }
         self.rings.lay(curve, &start, &mut rows, self.shape);
-        for number in 0..rows.len() {
-            let row = &rows[number];
+        for row in &rows {
             if let Some(reach) = self.doubtful(row, self.curves[trunk].radius_at(row.length)) {
                 self.doubt(trunk, row.length - reach, row.length + reach);
             }

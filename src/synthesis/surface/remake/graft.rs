@@ -25,6 +25,7 @@ pub(super) struct Graft {
 }
 
 /// A point on a tube.
+#[derive(Clone, Copy)]
 struct Spot {
     trunk: u32,
     /// Length along the trunk, angle around it, and radius.
@@ -127,14 +128,15 @@ impl<'a> Draft<'a> {
 
     fn add(&mut self, graft: &Graft, lines: Lines<'_>) {
         let (unique, first) = (self.old.unique() as u32, self.positions.len() as u32);
-        for &position in &graft.positions {
-            let Some(spot) = lines.spot(&graft.cones, position, None) else { continue };
-            let tangent = unit(spot.ahead.cross(spot.out)).unwrap_or_else(|| spot.out.any_orthonormal_vector());
+        let nearest = |position: Vec3| lines.spot(&graft.cones, position, None);
+        let spots: Vec<Option<Spot>> = graft.positions.iter().map(|&position| nearest(position)).collect();
+        for (&position, spot) in graft.positions.iter().zip(&spots) {
+            let (out, ahead) = spot.map_or((Vec3::X, Vec3::Z), |spot| (spot.out, spot.ahead));
             self.positions.push(position);
-            self.normals.push(spot.out);
-            self.tangents.push(across(tangent, spot.out).extend(1.0));
-            self.radii.push(spot.radius);
-            self.nodes.push(lines.node(&spot));
+            self.normals.push(out);
+            self.tangents.push(across(ahead.cross(out), out).extend(1.0));
+            self.radii.push(spot.map_or(0.0, |spot| spot.radius));
+            self.nodes.push(spot.map_or(0, |spot| lines.node(&spot)));
             self.uvs.push(None);
         }
         for &triangle in &graft.triangles {
@@ -142,14 +144,21 @@ impl<'a> Draft<'a> {
                 None => Corner::Old(vertex),
                 Some(new) => Corner::New(first + new),
             });
-            let places = corners.map(|corner| self.position(corner));
-            let middle = (places[0] + places[1] + places[2]) / 3.0;
-            let Some(center) = lines.spot(&graft.cones, middle, None) else { continue };
+            let own = triangle.map(|vertex| match vertex.checked_sub(unique) {
+                None => nearest(self.old.positions[vertex as usize]),
+                Some(new) => spots[new as usize],
+            });
+            // The texture of the tube on which its first corner lies.
+            let Some(leading) = own.into_iter().flatten().next() else { continue };
             let mut charted = corners;
-            for (corner, place) in charted.iter_mut().zip(places) {
-                let Some(spot) = lines.spot(&graft.cones, place, Some(center.trunk)) else { continue };
-                // The angle nearest to that of the middle, so that no triangle runs all the way round.
-                let angle = spot.angle + TAU * ((center.angle - spot.angle) / TAU).round();
+            for (corner, own) in charted.iter_mut().zip(own) {
+                let same = own.filter(|spot| spot.trunk == leading.trunk);
+                let position = self.position(*corner);
+                let Some(spot) = same.or_else(|| lines.spot(&graft.cones, position, Some(leading.trunk))) else {
+                    continue;
+                };
+                // The angle nearest to that of the first corner, so that no triangle runs all the way round.
+                let angle = spot.angle + TAU * ((leading.angle - spot.angle) / TAU).round();
                 let uv = Vec2::new(angle * spot.radius, spot.length);
                 *corner = self.charted(*corner, uv, &spot);
             }
