@@ -12,37 +12,24 @@ mod graft;
 mod knots;
 mod mend;
 mod patch;
+mod plan;
 mod sets;
 mod site;
 mod tubes;
 
-use super::curve::Curve;
-use super::layout::Layout;
 use super::mesh::SurfaceMesh;
-use super::trunks::Trunks;
 use crate::synthesis::pace::Pace;
 use crate::synthesis::tree::NodeId;
-use bevy_math::Vec3;
 use graft::{Graft, Lines};
 use knots::Knot;
 use mend::{MOST_FACES, Outcome};
 use site::Site;
 use std::collections::BTreeMap;
 
+pub(super) use plan::Plan;
+
 /// The most knots that become one.
 const MOST_PARTS: usize = 4;
-
-/// All that a mesh was made from.
-#[derive(Debug)]
-pub(super) struct Plan {
-    pub trunks: Trunks,
-    pub curves: Vec<Curve>,
-    pub layout: Layout,
-    /// Subtracted from positions for the curves.
-    pub origin: Vec3,
-    /// Faces of the mesh for each corner of its cage.
-    pub faces_per_corner: u32,
-}
 
 /// What was made again, by one node of each joint.
 #[derive(Clone, Debug, Default)]

@@ -1,7 +1,7 @@
 //! The mesh as vessels see it: where on which trunk a face lies, and which faces are near.
 
-use super::Plan;
 use super::ball::Ball;
+use super::plan::Plan;
 use super::tubes::{self, Cone};
 use crate::synthesis::surface::mesh::SurfaceMesh;
 use crate::synthesis::tree::NodeId;
