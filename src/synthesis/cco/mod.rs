@@ -1,8 +1,7 @@
 //! Constrained constructive optimisation: trees of least volume, one terminal at a time.
 //!
-//! In: a tissue with a border, flat or solid, roots, [`CcoSettings`] and a seed. Out: a
-//! [`VesselTree`](crate::synthesis::tree::VesselTree) for each kind of vessels that has a root. Source: Schreiner and
-//! Buxbaum 1993, Karch et al. 1999, in the form of OpenCCO (Kerautret et al., IPOL 2023).
+//! In: a tissue with a border, flat or solid, roots, [`CcoSettings`] and a seed. Out: a [`VesselTree`] for each kind of
+//! vessels that has a root. Source: Schreiner and Buxbaum 1993, Karch et al. 1999, in the form of OpenCCO (Kerautret et al., IPOL 2023).
 //!
 //! Every terminal has the same flow and pressure, so radii follow from the tree: they are those at which blood reaches
 //! all terminals with one loss of pressure, and obey Murray's law. To add a terminal,

@@ -172,7 +172,7 @@ mod tests {
 
     fn volume(outline: &Outline) -> f32 {
         let corners = |triangle: &[u32; 3]| triangle.map(|vertex| outline.positions[vertex as usize]);
-        outline.triangles.iter().map(|triangle| corners(triangle)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+        outline.triangles.iter().map(corners).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
     }
 
     #[test]
