@@ -4,7 +4,7 @@
 //! wrong. It goes by vertex numbers alone and welds nothing; for meshes with duplicated vertices see
 //! [`topology`](super::topology).
 
-use crate::synthesis::mesh::triangle_pair::has_area;
+use crate::synthesis::mesh::{disjoint_sets::DisjointSets, triangle_pair::has_area};
 use bevy_math::Vec3;
 
 /// What a mesh consists of, and what keeps it from being a closed surface.
@@ -143,41 +143,6 @@ fn sides(faces: &[[u32; 3]]) -> Vec<Side> {
         }
     }
     sides
-}
-
-/// Sets of numbers that become fewer by union. Each is known by its least number.
-struct DisjointSets {
-    /// A lower number of the same set, or the number itself.
-    lower: Vec<u32>,
-}
-
-impl DisjointSets {
-    /// Sets of one number each.
-    fn new(count: usize) -> Self {
-        Self { lower: (0..count as u32).collect() }
-    }
-
-    fn unite(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.first(a), self.first(b));
-        self.lower[a.max(b) as usize] = a.min(b);
-    }
-
-    /// The least number of a set.
-    fn first(&mut self, number: u32) -> u32 {
-        let mut at = number;
-        while self.lower[at as usize] != at {
-            // Path halving.
-            let next = self.lower[self.lower[at as usize] as usize];
-            self.lower[at as usize] = next;
-            at = next;
-        }
-        at
-    }
-
-    /// The least number of every set.
-    fn firsts(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.lower.len()).filter(|&number| self.lower[number] as usize == number)
-    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 pub(crate) mod bit_grid;
 pub mod closure;
 pub(crate) mod crossing;
+pub(crate) mod disjoint_sets;
 mod indexed;
 pub mod intersections;
 mod separation;

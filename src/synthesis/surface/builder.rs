@@ -11,7 +11,7 @@ use super::columns::Columns;
 use super::curve::{Curve, Lean};
 use super::direction::{across, unit};
 use super::exit::Exit;
-use super::layout::{Layout, Mouth, Stretch};
+use super::layout::{Layout, Mouth};
 use super::report::SurfaceReport;
 use super::rings::{Rings, Start};
 use super::rows::{Opening, Row, rows};
@@ -120,7 +120,7 @@ impl<'a> Builder<'a> {
                 self.curves[trunk].set_right(start.length, right);
                 self.curves[trunk].set_lean(lean);
                 if let Some(reach) = doubtful {
-                    self.doubt(trunk, start.length, lean.to.max(start.length + reach));
+                    self.layout.doubt(trunk, start.length, lean.to.max(start.length + reach));
                 }
                 (start, Some(edge))
             }
@@ -143,15 +143,12 @@ impl<'a> Builder<'a> {
         self.rings.lay(curve, &start, &mut rows, self.shape);
         for row in &rows {
             if let Some(reach) = self.doubtful(row, self.curves[trunk].radius_at(row.length)) {
-                self.doubt(trunk, row.length - reach, row.length + reach);
+                self.layout.doubt(trunk, row.length - reach, row.length + reach);
             }
         }
-        for ring in 0..self.rings.rings.len() {
-            let ring = self.rings.rings[ring];
-            if ring.is_doubtful {
-                let reach = DOUBTFUL * ring.station.radius;
-                self.doubt(trunk, ring.length - reach, ring.length + reach);
-            }
+        for ring in self.rings.rings.iter().filter(|ring| ring.is_doubtful) {
+            let reach = DOUBTFUL * ring.station.radius;
+            self.layout.doubt(trunk, ring.length - reach, ring.length + reach);
         }
         self.add_rings(trunk);
         self.add_belts(&rows);
@@ -167,10 +164,6 @@ impl<'a> Builder<'a> {
         }
         let is_crowded = row.is_shortened() || row.is_moved() || row.openings.len() > 1;
         is_crowded.then_some(row.half + DOUBTFUL * radius)
-    }
-
-    fn doubt(&mut self, trunk: usize, from: f32, to: f32) {
-        self.layout.doubts.push(Stretch { trunk: trunk as u32, from, to });
     }
 
     /// The exits of a trunk's laterals. Laterals of one that ends within the trunk leave the trunk itself.
@@ -238,9 +231,8 @@ impl<'a> Builder<'a> {
     fn add_ends(&mut self, trunk: usize, edge: Option<Vec<u32>>) {
         let (curve, nodes) = (&self.curves[trunk], self.trunks.nodes(trunk));
         let first = self.rings.rings[0];
-        let ends = self.cage.corners.len();
         let last = self.rings.rings.len() - 1;
-        self.layout.push_ring(self.rings.rings[last].length, ends);
+        self.layout.push_ring(self.rings.rings[last].length, self.cage.corners.len());
         match edge {
             Some(edge) => self.cage.sleeve(&edge, &first, self.bases[0]),
             None => caps::add(&mut self.cage, &first, self.bases[0], caps::End::Base, TipCap::Round, nodes[0]),
@@ -248,7 +240,7 @@ impl<'a> Builder<'a> {
         let node = nodes[curve.place_at(curve.length())];
         let (ring, tip) = (self.rings.rings[last], self.cage.corners.len());
         caps::add(&mut self.cage, &ring, self.bases[last], caps::End::Tip, self.tips, node);
-        self.layout.end([ends, tip, self.cage.corners.len()]);
+        self.layout.end([tip, self.cage.corners.len()]);
     }
 
     /// Tells the laterals where their holes are.

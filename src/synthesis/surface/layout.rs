@@ -25,8 +25,6 @@ pub(super) struct Stretch {
 struct Part {
     first_ring: u32,
     first_corner: u32,
-    /// First corner of the faces at its base.
-    base_corner: u32,
     /// First corner of the faces at its tip, and the corner after the last.
     tip_corner: u32,
     end_corner: u32,
@@ -37,7 +35,8 @@ struct Part {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
     parts: Vec<Part>,
-    /// Length along its trunk of each ring, and first corner of the belt that begins there.
+    /// Length along its trunk of each ring, and first corner of the belt that begins there; of a trunk's last ring, that
+    /// of the faces at its base.
     lengths: Vec<f32>,
     corners: Vec<u32>,
     /// Stretches in which faces may meet others.
@@ -49,27 +48,26 @@ impl Layout {
     pub fn begin(&mut self, mouth: Option<Mouth>, corner: usize) {
         let corner = corner as u32;
         let first_ring = self.lengths.len() as u32;
-        self.parts.push(Part {
-            first_ring,
-            first_corner: corner,
-            base_corner: corner,
-            tip_corner: corner,
-            end_corner: corner,
-            mouth,
-        });
+        self.parts.push(Part { first_ring, first_corner: corner, tip_corner: corner, end_corner: corner, mouth });
     }
 
-    /// Adds a ring, at which a belt begins unless it is the last.
+    /// Adds a ring, given the first corner of what follows: the belt that begins there, or the faces at the base after
+    /// the last ring.
     pub fn push_ring(&mut self, length: f32, corner: usize) {
         self.lengths.push(length);
         self.corners.push(corner as u32);
     }
 
-    /// Ends a trunk, given the first corner of the faces at its base and at its tip, and the one after all.
-    pub fn end(&mut self, [base, tip, end]: [usize; 3]) {
+    /// Ends a trunk, given the first corner of the faces at its tip, and the one after all.
+    pub fn end(&mut self, [tip, end]: [usize; 2]) {
         if let Some(part) = self.parts.last_mut() {
-            (part.base_corner, part.tip_corner, part.end_corner) = (base as u32, tip as u32, end as u32);
+            (part.tip_corner, part.end_corner) = (tip as u32, end as u32);
         }
+    }
+
+    /// Notes a stretch of a trunk in which faces may meet others.
+    pub fn doubt(&mut self, trunk: usize, from: f32, to: f32) {
+        self.doubts.push(Stretch { trunk: trunk as u32, from, to });
     }
 
     /// Lengths of a trunk's rings along it.
@@ -90,13 +88,11 @@ impl Layout {
     /// The corners of the belts between two rings of a trunk, with those of its ends if the rings are its first or last.
     pub fn corners_between(&self, trunk: u32, [low, high]: [u32; 2]) -> impl Iterator<Item = std::ops::Range<u32>> {
         let part = self.parts[trunk as usize];
-        let rings = self.rings(trunk);
-        let last = (rings.len() - 1) as u32;
-        let corner =
-            |ring: u32| if ring == last { part.base_corner } else { self.corners[rings.start + ring as usize] };
-        let belts = corner(low)..corner(high);
-        let base = (low == 0).then_some(part.base_corner..part.tip_corner);
-        let tip = (high == last).then_some(part.tip_corner..part.end_corner);
+        let corners = &self.corners[self.rings(trunk)];
+        let last = corners.len() - 1;
+        let belts = corners[low as usize]..corners[high as usize];
+        let base = (low == 0).then_some(corners[last]..part.tip_corner);
+        let tip = (high as usize == last).then_some(part.tip_corner..part.end_corner);
         std::iter::once(belts).chain(base).chain(tip)
     }
 
@@ -105,15 +101,16 @@ impl Layout {
         // A trunk without faces begins where the next one does.
         let trunk = self.parts.partition_point(|part| part.first_corner <= corner) - 1;
         let part = self.parts[trunk];
-        let rings = self.rings(trunk as u32);
-        let last = (rings.len() - 1) as u32;
+        let corners = &self.corners[self.rings(trunk as u32)];
+        let last = (corners.len() - 1) as u32;
         let ends = if corner >= part.tip_corner {
             [last, last]
-        } else if corner >= part.base_corner {
-            [0, 0]
         } else {
-            let after = self.corners[rings].partition_point(|&first| first <= corner) as u32;
-            [after - 1, after.min(last)]
+            // After the last ring's corner come the faces at the base.
+            match corners.partition_point(|&first| first <= corner) as u32 {
+                after if after > last => [0, 0],
+                after => [after - 1, after],
+            }
         };
         (trunk as u32, ends)
     }

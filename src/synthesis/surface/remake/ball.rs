@@ -1,5 +1,6 @@
 //! A ball in space.
 
+use crate::synthesis::mesh::triangle_index::closest_on_triangle;
 use bevy_math::Vec3;
 
 /// A ball, in which faces are replaced.
@@ -26,30 +27,15 @@ impl Ball {
     }
 
     /// Whether a triangle reaches into it.
-    pub fn meets(&self, [a, b, c]: [Vec3; 3]) -> bool {
-        nearest(self.center, a, b, c).distance_squared(self.center) < self.radius * self.radius
+    pub fn meets(&self, corners: [Vec3; 3]) -> bool {
+        let (_, nearest) = closest_on_triangle(self.center, corners);
+        nearest.distance(self.center.as_dvec3()) < f64::from(self.radius)
     }
 
     /// The ball with another radius.
     pub fn scaled(&self, factor: f32) -> Self {
         Self { radius: self.radius * factor, ..*self }
     }
-}
-
-/// The point of a triangle that is nearest to a point; without an area, of one of its edges.
-fn nearest(point: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
-    let normal = (b - a).cross(c - a);
-    let is_above = |from: Vec3, to: Vec3| (to - from).cross(point - from).dot(normal) >= 0.0;
-    if normal != Vec3::ZERO && is_above(a, b) && is_above(b, c) && is_above(c, a) {
-        return point - normal * ((point - a).dot(normal) / normal.length_squared());
-    }
-    let on_edge = |from: Vec3, to: Vec3| {
-        let along = to - from;
-        let share = (point - from).dot(along) / along.length_squared();
-        if share.is_finite() { from + along * share.clamp(0.0, 1.0) } else { from }
-    };
-    let edges = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
-    edges.into_iter().min_by(|p, q| p.distance_squared(point).total_cmp(&q.distance_squared(point))).unwrap_or(a)
 }
 
 #[cfg(test)]
@@ -59,16 +45,17 @@ mod tests {
     use rand::RngExt;
 
     #[test]
-    fn the_nearest_point_of_a_triangle_is_that_of_a_fine_grid() {
+    fn a_ball_meets_a_triangle_as_far_as_the_nearest_point_of_a_fine_grid() {
         let mut rng = Stream::Statistics.rng(1);
         let mut point = || Vec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0f32..1.0)));
         for case in 0..200 {
-            let [p, a, b, c] = std::array::from_fn(|_| point());
-            let found = nearest(p, a, b, c).distance(p);
+            let [center, a, b, c] = std::array::from_fn(|_| point());
             let steps = 0..=60u32;
             let grid = steps.clone().flat_map(|i| (0..=60 - i).map(move |j| [i, j].map(|step| step as f32 / 60.0)));
-            let least = grid.map(|[s, t]| (a + (b - a) * s + (c - a) * t).distance(p)).fold(f32::INFINITY, f32::min);
-            assert!(found <= least + 1e-5 && least - found < 0.06, "case {case}: {found} against {least}");
+            let distances = grid.map(|[s, t]| (a + (b - a) * s + (c - a) * t).distance(center));
+            let least = distances.fold(f32::INFINITY, f32::min);
+            let meets = |radius: f32| Ball { center, radius }.meets([a, b, c]);
+            assert!(meets(least + 1e-5) && !meets(least - 0.06), "case {case}: {least}");
         }
     }
 }

@@ -1,8 +1,7 @@
 //! Knots: faces that meet each other though their vessels need not.
 
-use super::sets::Sets;
 use super::site::Site;
-use crate::synthesis::mesh::self_intersections_paced;
+use crate::synthesis::mesh::{disjoint_sets::DisjointSets, self_intersections_paced};
 use crate::synthesis::pace::Pace;
 
 /// Faces of one joint that meet each other.
@@ -58,17 +57,16 @@ impl Site<'_> {
         let mut faces: Vec<u32> = pairs.iter().flatten().copied().collect();
         faces.sort_unstable();
         faces.dedup();
-        let number = |face: u32| faces.partition_point(|&other| other < face);
-        let mut links: Vec<[usize; 2]> = pairs.iter().map(|pair| pair.map(number)).collect();
-        let mut users: Vec<(u32, usize)> =
-            (0..faces.len()).flat_map(|face| self.corners(faces[face]).map(|vertex| (vertex, face))).collect();
+        let number = |face: u32| faces.partition_point(|&other| other < face) as u32;
+        let mut sets = DisjointSets::new(faces.len());
+        pairs.iter().map(|pair| pair.map(number)).for_each(|[a, b]| sets.unite(a, b));
+        let uses = (0u32..).zip(&faces).flat_map(|(place, &face)| self.corners(face).map(|vertex| (vertex, place)));
+        let mut users: Vec<(u32, u32)> = uses.collect();
         users.sort_unstable();
-        links.extend(users.windows(2).filter(|two| two[0].0 == two[1].0).map(|two| [two[0].1, two[1].1]));
-        let mut sets = Sets::new(faces.len());
-        links.into_iter().for_each(|[a, b]| sets.join(a, b));
-        let numbers = sets.numbers();
-        let mut knots = vec![Knot::default(); numbers.iter().max().map_or(0, |last| last + 1)];
-        for (face, knot) in faces.into_iter().zip(numbers) {
+        users.windows(2).filter(|two| two[0].0 == two[1].0).for_each(|two| sets.unite(two[0].1, two[1].1));
+        let (places, count) = sets.places();
+        let mut knots = vec![Knot::default(); count];
+        for (face, knot) in faces.into_iter().zip(places) {
             knots[knot].faces.push(face);
         }
         knots

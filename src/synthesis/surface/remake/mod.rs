@@ -13,7 +13,6 @@ mod knots;
 mod mend;
 mod patch;
 mod plan;
-mod sets;
 mod site;
 mod tubes;
 

@@ -2,12 +2,39 @@
 
 use super::ball::Ball;
 use super::contour::Outline;
-use super::sets::Sets;
+use crate::synthesis::mesh::disjoint_sets::DisjointSets;
 use bevy_math::Vec3;
 use std::collections::BTreeMap;
 
 /// The nearest that a cut comes to a vertex, as a share of the edge that it cuts.
 const LEAST_SHARE: f32 = 0.1;
+
+/// The edges of some faces, from corner to corner.
+struct Edges {
+    sorted: Vec<(u32, u32)>,
+}
+
+impl Edges {
+    /// The edges of faces, which may repeat their last vertex.
+    fn of<'a>(faces: impl Iterator<Item = &'a [u32]>) -> Self {
+        let mut sorted: Vec<(u32, u32)> = Vec::new();
+        for face in faces {
+            let next = |corner: usize| face[(corner + 1) % face.len()];
+            sorted.extend((0..face.len()).map(|corner| (face[corner], next(corner))).filter(|(a, b)| a != b));
+        }
+        sorted.sort_unstable();
+        Self { sorted }
+    }
+
+    /// Whether no face has an edge the other way round.
+    fn is_open(&self, &(a, b): &(u32, u32)) -> bool {
+        self.sorted.binary_search(&(b, a)).is_err()
+    }
+
+    fn open(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.sorted.iter().copied().filter(|edge| self.is_open(edge))
+    }
+}
 
 /// The open edges of some faces, and how the faces hang together.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -23,28 +50,22 @@ pub(super) struct Rim {
 impl Rim {
     /// The rim of some faces; a face may repeat its last vertex. `None` if loops touch each other.
     pub fn of<'a>(faces: impl Iterator<Item = &'a [u32]>) -> Option<Self> {
-        let (mut edges, mut firsts) = (Vec::<(u32, u32)>::new(), Vec::new());
-        for face in faces {
-            let next = |corner: usize| face[(corner + 1) % face.len()];
-            edges.extend((0..face.len()).map(|corner| (face[corner], next(corner))).filter(|(a, b)| a != b));
-            firsts.push(face[0]);
-        }
-        edges.sort_unstable();
-        let is_open = |&(a, b): &(u32, u32)| edges.binary_search(&(b, a)).is_err();
-        let open: Vec<(u32, u32)> = edges.iter().copied().filter(is_open).collect();
+        let mut firsts = Vec::new();
+        let edges = Edges::of(faces.inspect(|face| firsts.push(face[0])));
+        let open: Vec<(u32, u32)> = edges.open().collect();
         if open.windows(2).any(|pair| pair[0].0 == pair[1].0) {
             return None;
         }
-        let mut vertices: Vec<u32> = edges.iter().map(|edge| edge.0).collect();
+        let mut vertices: Vec<u32> = edges.sorted.iter().map(|edge| edge.0).collect();
         vertices.dedup();
         let number = |vertex: u32| vertices.partition_point(|&other| other < vertex);
-        let mut sets = Sets::new(vertices.len());
-        edges.iter().for_each(|&(a, b)| sets.join(number(a), number(b)));
-        let pieces = sets.numbers();
-        let mut euler = vec![0; pieces.iter().max().map_or(0, |last| last + 1)];
+        let mut sets = DisjointSets::new(vertices.len());
+        edges.sorted.iter().for_each(|&(a, b)| sets.unite(number(a) as u32, number(b) as u32));
+        let (pieces, count) = sets.places();
+        let mut euler = vec![0; count];
         pieces.iter().for_each(|&piece| euler[piece] += 1);
         firsts.iter().for_each(|&vertex| euler[pieces[number(vertex)]] += 1);
-        for edge in edges.iter().filter(|edge| edge.0 < edge.1 || is_open(edge)) {
+        for edge in edges.sorted.iter().filter(|edge| edge.0 < edge.1 || edges.is_open(edge)) {
             euler[pieces[number(edge.0)]] -= 1;
         }
         let mut rim = Self { euler, ..Self::default() };
@@ -138,19 +159,14 @@ pub(super) fn within(outline: Outline, ball: &Ball) -> Outline {
 
 /// The triangles of pieces that have an open edge; if there are none, those of the outermost piece.
 fn without_voids(triangles: Vec<[u32; 3]>, positions: &[Vec3]) -> Vec<[u32; 3]> {
-    let mut sets = Sets::new(positions.len());
-    let mut edges: Vec<(u32, u32)> = Vec::with_capacity(3 * triangles.len());
+    let mut sets = DisjointSets::new(positions.len());
     for &[a, b, c] in &triangles {
-        edges.extend([(a, b), (b, c), (c, a)]);
-        sets.join(a as usize, b as usize);
-        sets.join(a as usize, c as usize);
+        sets.unite(a, b);
+        sets.unite(a, c);
     }
-    edges.sort_unstable();
     let mut stays = vec![false; positions.len()];
-    for &(a, b) in &edges {
-        if edges.binary_search(&(b, a)).is_err() {
-            stays[sets.first(a as usize)] = true;
-        }
+    for (vertex, _) in Edges::of(triangles.iter().map(|triangle| &triangle[..])).open() {
+        stays[sets.first(vertex) as usize] = true;
     }
     if !stays.contains(&true) {
         let outermost = triangles
@@ -158,10 +174,10 @@ fn without_voids(triangles: Vec<[u32; 3]>, positions: &[Vec3]) -> Vec<[u32; 3]> 
             .flatten()
             .max_by(|&&a, &&b| positions[a as usize].x.total_cmp(&positions[b as usize].x).then(b.cmp(&a)));
         if let Some(&vertex) = outermost {
-            stays[sets.first(vertex as usize)] = true;
+            stays[sets.first(vertex) as usize] = true;
         }
     }
-    triangles.into_iter().filter(|&[a, ..]| stays[sets.first(a as usize)]).collect()
+    triangles.into_iter().filter(|&[a, ..]| stays[sets.first(a) as usize]).collect()
 }
 
 /// Without vertices that no triangle has.
