@@ -78,7 +78,7 @@ impl<'a> Builder<'a> {
     pub fn new(tree: &VesselTree, shape: &'a Shape, tips: TipCap, origin: Vec3) -> Self {
         let trunks = Trunks::of(tree);
         let curves = (0..trunks.len())
-            .map(|trunk| Curve::of(tree, trunks.nodes(trunk), trunks.base(trunk) != Base::Root, origin))
+            .map(|trunk| Curve::of(tree, trunks.nodes(trunk), matches!(trunks.base(trunk), Base::Joint { .. }), origin))
             .collect();
         let holes = vec![None; trunks.len()];
         let cage = Cage { starts: vec![0], ..Cage::default() };
@@ -158,34 +158,53 @@ impl<'a> Builder<'a> {
 
     /// Length around a row over which faces may meet others, if its openings may lack room.
     fn doubtful(&self, row: &Row, radius: f32) -> Option<f32> {
-        let is_flat = |opening: &Opening| self.exits[opening.exit as usize].is_flat;
-        if row.openings.iter().any(is_flat) {
+        let any = |is: fn(&Exit) -> bool| row.openings.iter().any(|opening| is(&self.exits[opening.exit as usize]));
+        if any(|exit| exit.parting.is_some()) {
             return Some(row.half + BESIDE * radius);
         }
         let is_crowded = row.is_shortened() || row.is_moved() || row.openings.len() > 1;
-        is_crowded.then_some(row.half + DOUBTFUL * radius)
+        (is_crowded || any(|exit| exit.is_tight)).then_some(row.half + DOUBTFUL * radius)
     }
 
     /// The exits of a trunk's laterals. Laterals of one that ends within the trunk leave the trunk itself.
     fn find_exits(&mut self, trunk: usize) {
         let curve = &self.curves[trunk];
         self.exits.clear();
+        let root = match self.trunks.base(trunk) {
+            Base::Root { at } => Some(curve.length_of(at as usize)),
+            Base::Joint { .. } => None,
+        };
         let joint = |lateral: u32| match self.trunks.base(lateral as usize) {
             Base::Joint { at, .. } => curve.length_of(at as usize),
-            Base::Root => 0.0,
+            Base::Root { .. } => 0.0,
         };
-        let laterals = self.trunks.laterals(trunk).iter();
-        let mut pending: Vec<(u32, f32)> = laterals.rev().map(|&lateral| (lateral, joint(lateral))).collect();
+        // Some leave the vessel that this one leaves.
+        let own = self.trunks.laterals(trunk).iter().filter(|&&lateral| self.holes[lateral as usize].is_none());
+        let mut pending: Vec<(u32, f32)> = own.rev().map(|&lateral| (lateral, joint(lateral))).collect();
         while let Some((lateral, joint)) = pending.pop() {
             let branch = &self.curves[lateral as usize];
-            let exit = Exit::new(lateral, curve, joint, branch);
+            let mut exit = Exit::new(lateral, curve, joint, branch);
+            // It leaves beside the trunk's end, or in the bend of a trunk that runs through a root.
+            exit.is_tight |= root == Some(joint);
             self.report.laterals += 1;
             if exit.ends_within(curve, branch) {
                 self.holes[lateral as usize] = Some(Hole::Absorbed);
                 pending.extend(self.trunks.laterals(lateral as usize).iter().rev().map(|&lateral| (lateral, joint)));
-            } else {
-                self.exits.push(exit);
+                continue;
             }
+            if let Some(parting) = exit.parting {
+                // What leaves it before it parts from the trunk leaves the trunk itself.
+                let others = self.trunks.laterals(lateral as usize);
+                let is_early = |other: &u32| match self.trunks.base(*other as usize) {
+                    Base::Joint { at, .. } => branch.length_of(at as usize) < parting.on_lateral,
+                    Base::Root { .. } => false,
+                };
+                pending.extend(others[..others.partition_point(is_early)].iter().rev().map(|&other| {
+                    let base = self.curves[other as usize].at(0.0).center;
+                    (other, curve.foot(base, parting.on_trunk))
+                }));
+            }
+            self.exits.push(exit);
         }
     }
 
@@ -277,9 +296,17 @@ impl<'a> Builder<'a> {
         let wide = ring.station.radius * self.shape.apothem(row.sides);
         let point = station.center + out * ring.station.radius;
         let lift = exit.lift(branch, &station, wide);
-        let shift = point - exit.point;
-        let shift = shift - out * shift.dot(out);
-        let reach = (LEAN * shift.length()).max(2.0 * exit.radius);
+        let aside = point - exit.point;
+        let mut shift = aside - out * aside.dot(out);
+        let mut reach = (LEAN * shift.length()).max(2.0 * exit.radius);
+        if let Some(parting) = exit.parting {
+            // Half in its trunk it would have no room for its first ring.
+            let height = (branch.at(lift).center - station.center).dot(out);
+            shift += out * (wide + 1.25 * exit.radius - height).max(0.0);
+            if !parting.is_clear {
+                reach = reach.max(8.0 * (branch.length() - lift));
+            }
+        }
         let lean = Lean { shift, from: lift, to: lift + reach };
         let begin = branch.at(lift);
         let normal = unit(begin.ahead + out).unwrap_or(begin.ahead);

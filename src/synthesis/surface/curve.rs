@@ -19,6 +19,8 @@ const WIDENING: f32 = 4.0;
 const EASE: f32 = 3.0;
 /// Distance of knots up to which bulges count, in radii.
 const NEAR: f32 = 6.0;
+/// Steps towards the foot of a point: each adds about two digits where the curve is no tighter than a vessel can be.
+const FOOT_STEPS: usize = 3;
 /// Segments shorter than this share of the radius have no direction of their own.
 const POINT: f32 = 1e-3;
 
@@ -327,6 +329,15 @@ impl Curve {
         let count = self.knots.len();
         let second = self.knots.partition_point(|knot| knot.length < length).clamp(1, count.max(2) - 1);
         (count > 1).then_some((second - 1, second))
+    }
+
+    /// The length at the foot of a point, from one near it.
+    pub fn foot(&self, point: Vec3, mut length: f32) -> f32 {
+        for _ in 0..FOOT_STEPS {
+            let here = self.at(length);
+            length = (length + (point - here.center).dot(here.ahead)).clamp(0.0, self.length());
+        }
+        length
     }
 
     /// The station at a length; beyond the ends the curve goes straight on.

@@ -43,6 +43,7 @@ mod half_edges;
 mod layout;
 mod limit;
 mod mesh;
+mod parting;
 mod remake;
 mod report;
 mod rings;

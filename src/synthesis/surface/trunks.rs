@@ -15,8 +15,11 @@ const FEW: usize = 64;
 /// Where a trunk begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Base {
-    /// At a root of the tree, which it closes with an end of its own.
-    Root,
+    /// At a root of the tree, which it closes with an end of its own, or at the tip behind a root that it runs through.
+    Root {
+        /// The place of the root among the trunk's nodes.
+        at: u32,
+    },
     /// At a node of another trunk: the trunk's first node is that one's node.
     Joint {
         /// The other trunk, which comes before this one.
@@ -57,9 +60,9 @@ impl Trunks {
             }
             let (trunk, start) = (trunks.bases.len() as u32, trunks.nodes.len());
             if parent == NO_PARENT {
-                trunks.bases.push(Base::Root);
                 trunks.nodes.extend(courses.along(courses.back[node]));
                 trunks.nodes[start..].reverse();
+                trunks.bases.push(Base::Root { at: (trunks.nodes.len() - start) as u32 });
             } else {
                 let (trunk, at) = places[parent as usize];
                 trunks.bases.push(Base::Joint { trunk, at });
@@ -100,7 +103,7 @@ impl Trunks {
         let mut sorted: Vec<(u32, u32, u32)> = (0u32..)
             .zip(&self.bases)
             .filter_map(|(lateral, base)| match *base {
-                Base::Root => None,
+                Base::Root { .. } => None,
                 Base::Joint { trunk, at } => Some((trunk, at, lateral)),
             })
             .collect();
