@@ -83,7 +83,8 @@ impl Exit {
     /// Moves the opening to where the lateral parts from the trunk, if that is farther away.
     fn follow(&mut self, trunk: &Curve, joint: f32, curve: &Curve) {
         let parting = Parting::find(trunk, joint, curve);
-        if parting.is_clear && parting.on_lateral < self.usual_reach(trunk.at(joint).radius) {
+        let is_far = parting.on_lateral > self.usual_reach(trunk.at(joint).radius);
+        if parting.is_clear && self.slope > LEAST_SLOPE && !is_far {
             return;
         }
         let station = trunk.at(parting.on_trunk);
