@@ -9,7 +9,7 @@ use crate::synthesis::{
     segment_index::start_radius,
     tree::{NO_PARENT, VesselTree},
 };
-use bevy_math::Vec3;
+use bevy_math::{Vec3, ops};
 
 /// Distance between kept nodes, in radii.
 const SPACING: f32 = 1.0;
@@ -40,6 +40,11 @@ impl Station {
     /// Unit vector across, a quarter turn from [`right`](Self::right).
     pub fn up(&self) -> Vec3 {
         self.ahead.cross(self.right)
+    }
+
+    /// The angle of a direction around the curve, from [`right`](Self::right) to [`up`](Self::up).
+    pub fn angle_of(&self, direction: Vec3) -> f32 {
+        ops::atan2(direction.dot(self.up()), direction.dot(self.right))
     }
 }
 

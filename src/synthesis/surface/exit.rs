@@ -117,8 +117,7 @@ impl Exit {
 
     /// The angle of the opening around a station of the trunk.
     pub fn angle(&self, station: &Station) -> f32 {
-        let out = across(self.point - station.center, station.ahead);
-        ops::atan2(out.dot(station.up()), out.dot(station.right))
+        station.angle_of(across(self.point - station.center, station.ahead))
     }
 
     /// Length along the lateral at which it is clear of a trunk of this radius around a station.
