@@ -280,7 +280,7 @@ impl<'a> Builder<'a> {
             Seam::Open(other) => {
                 other.cap(&mut self.cage, cap);
                 end.cap(&mut self.cage, cap);
-                self.report.unclosed.push(number);
+                self.report.unclosed.push(NodeId(self.looped.own(end.node)));
             }
             Seam::Done => end.cap(&mut self.cage, cap),
         }
@@ -310,7 +310,7 @@ impl<'a> Builder<'a> {
             }
             Seam::Done => return,
         }
-        self.report.unclosed.push(number);
+        self.report.unclosed.push(NodeId(self.looped.own(tip)));
     }
 
     /// Tells the laterals where their holes are.

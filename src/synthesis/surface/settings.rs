@@ -1,6 +1,6 @@
 //! What a user chooses of a surface, and what is wrong with a choice.
 
-use crate::synthesis::tree::NodeId;
+use crate::synthesis::tree::{NodeId, TreeError};
 
 /// How fine a surface is.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,12 +121,15 @@ pub enum SurfaceError {
         /// Number of nodes.
         nodes: usize,
     },
-    /// A vessel that closes a loop, between two nodes at one place.
-    #[error("the vessel that closes a loop between nodes {} and {} has no length; leave it out", ends[0].0, ends[1].0)]
+    /// A loop whose nodes lie at one place.
+    #[error("the loop closed between nodes {} and {} has no length; leave it out", ends[0].0, ends[1].0)]
     ClosingLength {
         /// The nodes given.
         ends: [NodeId; 2],
     },
+    /// A network that cannot be hung up as a tree.
+    #[error(transparent)]
+    Network(#[from] TreeError),
     /// A vessel that closes a loop, without a radius.
     #[error("the vessel that closes a loop between nodes {} and {} has radius {radius}; set it above 0", ends[0].0, ends[1].0)]
     ClosingRadius {
