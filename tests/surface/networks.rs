@@ -1,7 +1,7 @@
 //! A thousand grown networks: all tissues, both generators' presets, many seeds, three widths.
 
 use crate::common::tissues;
-use crate::measures::{sound_surface, union_volume, volume, widened};
+use crate::measures::{meeting, sound_surface, union_volume, volume, widened};
 use bevy_vessels::synthesis::{
     colonization::{Colonization, ColonizationSettings},
     preset::PresetName,
@@ -46,26 +46,25 @@ fn a_thousand_networks_have_closed_surfaces() {
     });
 }
 
-/// The published share of bifurcations without a defect is 83 % at best. Here, of nodes, it is above 99.9 %.
+/// The published share of bifurcations without a defect is 83 % at best. Here none has one at the presets' radii, but for
+/// vessels that run through each other; at radii so wide that joints lack room, hardly any.
 #[test]
-fn hardly_a_face_of_a_grown_network_meets_another() {
-    let (mut faces, mut meeting, mut sound, mut remade, mut left) = (0, 0, 0, 0, 0);
-    for seed in 0..70 {
-        for tree in grow(seed) {
-            let Surface { mesh, report } = sound_surface(&format!("seed {seed}"), &tree, &SurfaceSettings::default());
-            let check = mesh.validate();
-            faces += mesh.triangle_count();
-            meeting += check.intersecting_triangles();
-            sound += u32::from(check.is_sound());
-            remade += report.remade.len();
-            left += report.left.len();
+fn faces_of_grown_networks_do_not_meet() {
+    let trees: Vec<VesselTree> = (0..70).flat_map(grow).collect();
+    for (factor, most) in [(1.0, 0), (4.0, 5), (8.0, 50)] {
+        let (mut faces, mut own, mut all, mut remade, mut left) = (0, 0, 0, 0, 0);
+        for tree in &trees {
+            let tree = widened(tree, factor);
+            let Surface { mesh, report } = Surface::new(&tree, &SurfaceSettings::default()).expect("a surface");
+            let [meeting, its] = meeting(&tree, &mesh);
+            (all, own, faces) = (all + meeting, own + its, faces + mesh.triangle_count());
+            (remade, left) = (remade + report.remade.len(), left + report.left.len());
         }
+        println!(
+            "radii × {factor}: of {faces} triangles {all} meet others, {own} of them where no segments run through each other; {remade} joints made again, {left} left"
+        );
+        assert!(own * 100_000 <= most * faces, "× {factor}: {own} of {faces}");
     }
-    println!(
-        "{meeting} of {faces} triangles meet others; {sound} of 140 networks are sound; {remade} joints made again, {left} left"
-    );
-    assert!((meeting as f64) < 3e-4 * faces as f64, "{meeting} of {faces}");
-    assert!(sound >= 130 && remade > 5 && left < 16, "{sound} are sound, {remade} joints made again, {left} left");
 }
 
 #[test]
