@@ -58,11 +58,11 @@ fn a_ring_of_many_corners_is_a_torus() {
     let surface =
         closed(&tree, &[ClosingVessel::between(&tree, NodeId(59), NodeId(0))], &SurfaceSettings::default(), 1);
     let exact = 2.0 * PI * PI * f64::from(0.1f32).powi(2);
-    assert!((volume(&surface.mesh) / exact - 1.0).abs() < 0.01, "{} of {exact}", volume(&surface.mesh));
+    assert!((volume(&surface.mesh) / exact - 1.0).abs() < 0.02, "{} of {exact}", volume(&surface.mesh));
     // Nothing marks the place where it was cut: all vertices lie on the torus.
     for position in &surface.mesh.positions {
         let distance = (position.truncate().length() - 1.0).hypot(position.z);
-        assert!((distance / 0.1 - 1.0).abs() < 0.03, "{distance} at {position}");
+        assert!((distance / 0.1 - 1.0).abs() < 0.05, "{distance} at {position}");
     }
 }
 
