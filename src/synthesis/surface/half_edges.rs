@@ -81,7 +81,7 @@ impl HalfEdges {
 
     /// Number of half-edges.
     pub fn len(&self) -> usize {
-        self.origins.len()
+        self.twins.len()
     }
 
     /// The next subdivision.
@@ -273,7 +273,7 @@ pub(super) struct Split {
     /// Vertex in the face of each half-edge.
     pub face_of: Vec<u32>,
     face_uvs: Vec<Vec2>,
-    edges: Vec<u32>,
+    pub edges: Vec<u32>,
     pub first_face: u32,
     pub first_edge: u32,
 }
@@ -283,6 +283,11 @@ impl Split {
     #[inline]
     pub fn edge(&self, half_edge: u32) -> u32 {
         self.first_edge + self.edges[half_edge as usize]
+    }
+
+    /// Gives a half-edge another vertex than its twin.
+    pub fn set_edge(&mut self, half_edge: u32, vertex: u32) {
+        self.edges[half_edge as usize] = vertex - self.first_edge;
     }
 
     /// Texture coordinates of the vertex in a half-edge's face.
