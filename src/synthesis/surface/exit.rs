@@ -7,9 +7,10 @@
 //!
 //! One that leaves so flat that this lies far away is followed along both curves to where it is clear.
 
-use super::curve::{Curve, Station};
+use super::curve::Curve;
 use super::direction::{across, unit};
 use super::parting::Parting;
+use super::spline::Station;
 use bevy_math::{Vec3, ops};
 use std::f32::consts::FRAC_1_SQRT_2;
 

@@ -53,6 +53,7 @@ mod seams;
 mod settings;
 mod shape;
 mod sketch;
+mod spline;
 mod trunks;
 
 pub use build::Surface;

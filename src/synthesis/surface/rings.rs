@@ -5,10 +5,11 @@
 //! then one of the two rings is left out, or both planes are tilted to stand alike.
 
 use super::columns::Columns;
-use super::curve::{Curve, Station};
+use super::curve::Curve;
 use super::direction::unit;
 use super::rows::Row;
 use super::shape::Shape;
+use super::spline::Station;
 use bevy_math::Vec3;
 
 /// The longest distance between rings, in radii.
