@@ -4,6 +4,9 @@
 
 #![cfg(all(feature = "mesh_files", feature = "serialize"))]
 
+#[path = "common/shared.rs"]
+mod shared;
+
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::Colonization,
@@ -13,9 +16,8 @@ use bevy_vessels::synthesis::{
     tissue::{SourceData, Tissue, TissueMode},
     tree::{VesselKind, statistics},
 };
-use std::{path::Path, sync::Arc};
+use std::sync::Arc;
 
-const ORGANS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs");
 const SEEDS: u64 = 3;
 const SAMPLES: usize = 20_000;
 /// Octants with fewer samples are ignored.
@@ -46,11 +48,7 @@ fn worst(growth: &Colonization, octants: &[Vec<Vec3>], kind: VesselKind) -> f32 
 /// Grows organs with several seeds. In the worst octant arteries and veins must supply at least these shares.
 fn check(organs: &[&str], preset: PresetName, mode: TissueMode, least: [f32; 2]) {
     for name in organs {
-        let path = Path::new(ORGANS).join(format!("{name}.glb"));
-        if !path.exists() {
-            eprintln!("skipped: there is no {}", path.display());
-            continue;
-        }
+        let Some(path) = shared::folder(&format!("data/organs/{name}.glb")) else { continue };
         let mesh = load_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
         let mut preset = preset.load();
         preset.tissue = mode.into();
