@@ -9,7 +9,7 @@ use crate::synthesis::{
     segment_index::start_radius,
     tree::{NO_PARENT, VesselTree},
 };
-use bevy_math::Vec3;
+use bevy_math::{Vec3, ops};
 
 /// Distance between kept nodes, in radii.
 const SPACING: f32 = 1.0;
@@ -19,6 +19,8 @@ const WIDENING: f32 = 4.0;
 const EASE: f32 = 3.0;
 /// Distance of knots up to which bulges count, in radii.
 const NEAR: f32 = 6.0;
+/// Steps towards the foot of a point: each adds about two digits where the curve is no tighter than a vessel can be.
+const FOOT_STEPS: usize = 3;
 /// Segments shorter than this share of the radius have no direction of their own.
 const POINT: f32 = 1e-3;
 
@@ -38,6 +40,11 @@ impl Station {
     /// Unit vector across, a quarter turn from [`right`](Self::right).
     pub fn up(&self) -> Vec3 {
         self.ahead.cross(self.right)
+    }
+
+    /// The angle of a direction around the curve, from [`right`](Self::right) to [`up`](Self::up).
+    pub fn angle_of(&self, direction: Vec3) -> f32 {
+        ops::atan2(direction.dot(self.up()), direction.dot(self.right))
     }
 }
 
@@ -327,6 +334,15 @@ impl Curve {
         let count = self.knots.len();
         let second = self.knots.partition_point(|knot| knot.length < length).clamp(1, count.max(2) - 1);
         (count > 1).then_some((second - 1, second))
+    }
+
+    /// The length at the foot of a point, from one near it.
+    pub fn foot(&self, point: Vec3, mut length: f32) -> f32 {
+        for _ in 0..FOOT_STEPS {
+            let here = self.at(length);
+            length = (length + (point - here.center).dot(here.ahead)).clamp(0.0, self.length());
+        }
+        length
     }
 
     /// The station at a length; beyond the ends the curve goes straight on.

@@ -25,6 +25,9 @@ const LEAST_APART: f32 = 0.1;
 const FAR: f32 = 3.0;
 /// The most by which a ring is moved or widened for the surface's sake, in radii.
 const MOST_SWELL: f32 = 0.25;
+/// Length over which a bend is sharp, in radii, and the cosine of its angle: 100°.
+const BEND: f32 = 7.0;
+const SHARP: f32 = -0.17;
 /// Passes in which rings are left out or tilted.
 const PASSES: usize = 6;
 /// Directions in which the distance of two rings is checked.
@@ -45,7 +48,7 @@ pub(super) struct Ring {
     pub radius: f32,
     /// Its first angle in the list.
     pub first_angle: u32,
-    /// Whether a neighbour met it before it was tilted, or one beside it left out.
+    /// Whether faces beside it may meet others: a neighbour met it before it was tilted, or it lies in a sharp bend.
     pub is_doubtful: bool,
     /// Rings of one row have one number, and a common plane. Others may be left out.
     row: Option<u32>,
@@ -82,8 +85,9 @@ pub(super) struct Rings {
 }
 
 impl Rings {
-    /// Lays the rings of a trunk. Sets the columns of its rows' openings.
-    pub fn lay(&mut self, curve: &Curve, start: &Start, rows: &mut [Row], shape: &Shape) {
+    /// Lays the rings of a trunk, the last one with a vertex in a direction if one is given. Sets the columns of its rows'
+    /// openings.
+    pub fn lay(&mut self, curve: &Curve, start: &Start, rows: &mut [Row], shape: &Shape, spoke: Option<Vec3>) {
         self.rings.clear();
         self.angles.clear();
         self.push(curve, start.length, start.sides, None);
@@ -110,11 +114,11 @@ impl Rings {
             }
             (columns, before) = (next, row.length + row.half);
         }
-        self.end(curve, before, &columns, shape);
+        self.end(curve, before, &columns, shape, spoke);
         self.settle();
     }
 
-    fn end(&mut self, curve: &Curve, before: f32, columns: &Columns, shape: &Shape) {
+    fn end(&mut self, curve: &Curve, before: f32, columns: &Columns, shape: &Shape, spoke: Option<Vec3>) {
         let radius = curve.radius_at(curve.length());
         // A root without a segment is a ball: both ends on one ring.
         if self.rings.len() == 1 && self.rings[0].length == 0.0 && curve.length() < LEAST_APART * radius {
@@ -122,7 +126,10 @@ impl Rings {
         }
         let tip = curve.length().max(before + 0.3 * radius);
         let sides = shape.sides_of(radius);
-        let even = columns.evened(sides);
+        let even = match spoke {
+            Some(spoke) => columns.evened_to(sides, curve.at(tip).angle_of(spoke)),
+            None => columns.evened(sides),
+        };
         self.fill(curve, [before, tip], [columns, &even], sides, shape);
         let last = self.rings.len() - 1;
         let sides = sides.clamp(self.rings[last].sides / 2, self.rings[last].sides * 2).max(4);
@@ -171,6 +178,7 @@ impl Rings {
         for ring in &mut self.rings {
             ring.normal = within_tilt(ring.normal, ring.station.ahead);
         }
+        self.doubt_bends();
         for _ in 0..PASSES {
             if !self.settle_once() {
                 break;
@@ -212,6 +220,20 @@ impl Rings {
         }
         self.rings.truncate(kept + 1);
         has_changed
+    }
+
+    /// Doubts rings within sharp bends: the faces on the inner side may meet.
+    fn doubt_bends(&mut self) {
+        let mut first = 0;
+        for last in 1..self.rings.len() {
+            let Ring { station, length, .. } = self.rings[last];
+            while length - self.rings[first].length > BEND * station.radius {
+                first += 1;
+            }
+            if (first..last).any(|ring| self.rings[ring].station.ahead.dot(station.ahead) < SHARP) {
+                self.rings[first..=last].iter_mut().for_each(|ring| ring.is_doubtful = true);
+            }
+        }
     }
 
     /// Moves and widens rings so that the surface follows the curve.

@@ -8,7 +8,7 @@ use crate::synthesis::surface::curve::Curve;
 use crate::synthesis::surface::direction::{across, unit};
 use crate::synthesis::surface::mesh::SurfaceMesh;
 use crate::synthesis::surface::trunks::Trunks;
-use bevy_math::{Vec2, Vec3, Vec4, ops};
+use bevy_math::{Vec2, Vec3, Vec4};
 use std::{collections::BTreeMap, f32::consts::TAU};
 
 /// What takes the place of some faces.
@@ -61,7 +61,7 @@ impl Lines<'_> {
         let station = self.curves[cone.trunk as usize].at(length);
         let away = point - cone.centers[0].lerp(cone.centers[1], share);
         let out = unit(away).unwrap_or_else(|| across(away, station.ahead));
-        let angle = ops::atan2(out.dot(station.up()), out.dot(station.right));
+        let angle = station.angle_of(out);
         Some(Spot { trunk: cone.trunk, length, angle, radius: station.radius, out, ahead: station.ahead })
     }
 
