@@ -193,6 +193,9 @@ fn the_wall_keeps_its_thickness_and_the_lumen_is_open() {
             assert!(distance < room, "colon {seed}: the lumen reaches beyond the wall at point {index}");
         }
         assert!(nearest(&colon, colon.lumen.eye).1 < 0.01, "the endoscope is in the lumen");
+        let wall = colon.mesh.positions.iter().map(|point| point.distance(colon.lumen.eye));
+        let gap = wall.fold(f32::INFINITY, f32::min);
+        assert!(gap > 0.008, "colon {seed}: the endoscope begins {gap} m from the wall");
         let end = colon.centre_line[last];
         assert!((colon.rim.eye - end).dot(end - colon.rim.target) > 0.0, "the rim is seen from outside");
     }
