@@ -94,18 +94,19 @@ impl Lines<'_> {
 
 /// Puts grafts in the place of faces.
 pub(super) fn insert(mesh: &mut SurfaceMesh, grafts: &[Graft], lines: Lines<'_>) {
-    let mut draft = Draft::of(mesh, grafts);
+    let mut draft = Draft { old: mesh, new: Parts::default(), known: BTreeMap::new() };
     for graft in grafts {
         draft.add(graft, lines);
     }
-    *mesh = draft.finished();
+    let parts = draft.new;
+    let mut goes = vec![false; mesh.faces.len()];
+    grafts.iter().flat_map(|graft| &graft.faces).for_each(|&face| goes[face as usize] = true);
+    parts.put_into(mesh, &goes);
 }
 
-/// A mesh while its faces are replaced.
-struct Draft<'a> {
-    old: &'a SurfaceMesh,
-    /// Faces that stay, with the old mesh's numbers of vertices.
-    faces: Vec<[u32; 4]>,
+/// What comes into a mesh.
+#[derive(Default)]
+struct Parts {
     /// Data of new vertices.
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
@@ -117,6 +118,12 @@ struct Draft<'a> {
     triangles: Vec<[Corner; 3]>,
     /// Copies of vertices: of whom, and with which coordinates.
     copies: Vec<(Corner, Vec2, Vec4)>,
+}
+
+/// A mesh and what comes into it.
+struct Draft<'a> {
+    old: &'a SurfaceMesh,
+    new: Parts,
     known: BTreeMap<(Corner, [u32; 2]), u32>,
 }
 
@@ -128,28 +135,9 @@ enum Corner {
     Copy(u32),
 }
 
-impl<'a> Draft<'a> {
-    fn of(old: &'a SurfaceMesh, grafts: &[Graft]) -> Self {
-        let mut goes = vec![false; old.faces.len()];
-        grafts.iter().flat_map(|graft| &graft.faces).for_each(|&face| goes[face as usize] = true);
-        let faces = old.faces.iter().zip(&goes).filter(|(_, goes)| !**goes).map(|(face, _)| *face).collect();
-        Self {
-            old,
-            faces,
-            positions: Vec::new(),
-            normals: Vec::new(),
-            tangents: Vec::new(),
-            radii: Vec::new(),
-            nodes: Vec::new(),
-            uvs: Vec::new(),
-            triangles: Vec::new(),
-            copies: Vec::new(),
-            known: BTreeMap::new(),
-        }
-    }
-
+impl Draft<'_> {
     fn add(&mut self, graft: &Graft, lines: Lines<'_>) {
-        let (unique, first) = (self.old.unique() as u32, self.positions.len() as u32);
+        let (unique, first) = (self.old.unique() as u32, self.new.positions.len() as u32);
         let nearest = |position: Vec3| lines.spot(&graft.cones, position, None);
         let spots: Vec<Option<Spot>> = graft.positions.iter().map(|&position| nearest(position)).collect();
         let normals = graft.normals(&self.old.positions[..unique as usize]);
@@ -157,12 +145,12 @@ impl<'a> Draft<'a> {
             let (out, ahead) = spot.map_or((Vec3::X, Vec3::Z), |spot| (spot.out, spot.ahead));
             // In a crease, the surface is that of no tube.
             let out = if out.dot(normal) < CREASED { normal } else { out };
-            self.positions.push(position);
-            self.normals.push(out);
-            self.tangents.push(across(ahead.cross(out), out).extend(1.0));
-            self.radii.push(spot.map_or(0.0, |spot| spot.radius));
-            self.nodes.push(spot.map_or(0, |spot| lines.node(&spot)));
-            self.uvs.push(None);
+            self.new.positions.push(position);
+            self.new.normals.push(out);
+            self.new.tangents.push(across(ahead.cross(out), out).extend(1.0));
+            self.new.radii.push(spot.map_or(0.0, |spot| spot.radius));
+            self.new.nodes.push(spot.map_or(0, |spot| lines.node(&spot)));
+            self.new.uvs.push(None);
         }
         for &triangle in &graft.triangles {
             let corners = triangle.map(|vertex| match vertex.checked_sub(unique) {
@@ -187,31 +175,31 @@ impl<'a> Draft<'a> {
                 let uv = Vec2::new(angle * spot.radius, spot.length);
                 *corner = self.charted(*corner, uv, &spot);
             }
-            self.triangles.push(charted);
+            self.new.triangles.push(charted);
         }
     }
 
     fn position(&self, corner: Corner) -> Vec3 {
         match corner {
             Corner::Old(vertex) => self.old.positions[vertex as usize],
-            Corner::New(vertex) => self.positions[vertex as usize],
-            Corner::Copy(copy) => self.position(self.copies[copy as usize].0),
+            Corner::New(vertex) => self.new.positions[vertex as usize],
+            Corner::Copy(copy) => self.position(self.new.copies[copy as usize].0),
         }
     }
 
     /// A vertex with these texture coordinates.
     fn charted(&mut self, corner: Corner, uv: Vec2, spot: &Spot) -> Corner {
         if let Corner::New(vertex) = corner {
-            let own = self.uvs[vertex as usize].get_or_insert(uv);
+            let own = self.new.uvs[vertex as usize].get_or_insert(uv);
             if *own == uv {
                 return corner;
             }
         }
         let key = (corner, [uv.x.to_bits(), uv.y.to_bits()]);
-        let copies = &mut self.copies;
+        let copies = &mut self.new.copies;
         let normal = match corner {
             Corner::Old(vertex) => self.old.normals[vertex as usize],
-            Corner::New(vertex) => self.normals[vertex as usize],
+            Corner::New(vertex) => self.new.normals[vertex as usize],
             Corner::Copy(_) => spot.out,
         };
         let copy = *self.known.entry(key).or_insert_with(|| {
@@ -221,47 +209,37 @@ impl<'a> Draft<'a> {
         });
         Corner::Copy(copy)
     }
+}
 
-    /// The mesh, without vertices that no face has.
-    fn finished(self) -> SurfaceMesh {
-        let (old, unique) = (self.old, self.old.unique());
-        let mut is_used = vec![false; old.positions.len()];
-        for &vertex in self.faces.iter().flatten() {
-            is_used[vertex as usize] = true;
-            is_used[old.original(vertex) as usize] = true;
-        }
-        for corner in self.triangles.iter().flatten().chain(self.copies.iter().map(|copy| &copy.0)) {
-            if let Corner::Old(vertex) = corner {
-                is_used[*vertex as usize] = true;
-            }
-        }
-        let mut mesh = SurfaceMesh::default();
-        let mut numbers = vec![u32::MAX; old.positions.len()];
-        let keep = |vertex: usize, mesh: &mut SurfaceMesh, numbers: &mut [u32]| {
-            numbers[vertex] = mesh.positions.len() as u32;
-            mesh.positions.push(old.positions[vertex]);
-            mesh.normals.push(old.normals[vertex]);
-            mesh.tangents.push(old.tangents[vertex]);
-            mesh.uvs.push(old.uvs[vertex]);
-            mesh.radii.push(old.radii[vertex]);
-            mesh.nodes.push(old.nodes[vertex]);
-        };
-        (0..unique).filter(|&vertex| is_used[vertex]).for_each(|vertex| keep(vertex, &mut mesh, &mut numbers));
-        let first_new = mesh.positions.len() as u32;
-        mesh.positions.extend(&self.positions);
-        mesh.normals.extend(&self.normals);
-        mesh.tangents.extend(&self.tangents);
-        mesh.radii.extend(&self.radii);
-        mesh.nodes.extend(&self.nodes);
-        mesh.uvs.extend(self.uvs.iter().map(|uv| uv.unwrap_or_default()));
-        for vertex in (unique..old.positions.len()).filter(|&vertex| is_used[vertex]) {
-            keep(vertex, &mut mesh, &mut numbers);
-            mesh.copies.push(numbers[old.copies[vertex - unique] as usize]);
-        }
+impl Parts {
+    /// Puts the new faces in the place of those that go, without vertices that no face has. In place, since a mesh may
+    /// take most of the memory there is.
+    fn put_into(self, mesh: &mut SurfaceMesh, goes: &[bool]) {
+        let stays = self.vertices_that_stay(mesh, goes);
+        let (old_unique, new) = (mesh.unique(), self.positions.len() as u32);
+        let mut count = 0;
+        let numbers: Vec<u32> = (0..stays.len())
+            .map(|vertex| {
+                // New vertices stand between those with places of their own and their copies.
+                let number = count + if vertex < old_unique { 0 } else { new };
+                count += u32::from(stays[vertex]);
+                number
+            })
+            .collect();
+        let unique = numbers.get(old_unique).map_or(count, |&first_copy| first_copy - new) as usize;
+        keep(&mut mesh.copies, &stays[old_unique..]);
+        mesh.copies.iter_mut().for_each(|original| *original = numbers[*original as usize]);
+        let uvs = self.uvs.into_iter().map(Option::unwrap_or_default).collect();
+        exchange(&mut mesh.positions, &stays, unique, self.positions);
+        exchange(&mut mesh.normals, &stays, unique, self.normals);
+        exchange(&mut mesh.tangents, &stays, unique, self.tangents);
+        exchange(&mut mesh.radii, &stays, unique, self.radii);
+        exchange(&mut mesh.nodes, &stays, unique, self.nodes);
+        exchange(&mut mesh.uvs, &stays, unique, uvs);
         let first_copy = mesh.positions.len() as u32;
         let number = |corner: Corner| match corner {
             Corner::Old(vertex) => numbers[vertex as usize],
-            Corner::New(vertex) => first_new + vertex,
+            Corner::New(vertex) => unique as u32 + vertex,
             Corner::Copy(copy) => first_copy + copy,
         };
         for &(corner, uv, tangent) in &self.copies {
@@ -274,8 +252,43 @@ impl<'a> Draft<'a> {
             mesh.uvs.push(uv);
             mesh.copies.push(original as u32);
         }
-        mesh.faces = self.faces.iter().map(|face| face.map(|vertex| numbers[vertex as usize])).collect();
+        let mut face = 0;
+        mesh.faces.retain_mut(|corners| {
+            face += 1;
+            *corners = corners.map(|vertex| numbers[vertex as usize]);
+            !goes[face - 1]
+        });
+        mesh.faces.reserve_exact(self.triangles.len());
         mesh.faces.extend(self.triangles.iter().map(|&[a, b, c]| [number(a), number(b), number(c), number(c)]));
-        mesh
     }
+
+    /// Which vertices faces will have: those of the faces that stay, with their originals, and those of new ones.
+    fn vertices_that_stay(&self, mesh: &SurfaceMesh, goes: &[bool]) -> Vec<bool> {
+        let mut stays = vec![false; mesh.positions.len()];
+        for (face, _) in mesh.faces.iter().zip(goes).filter(|(_, goes)| !**goes) {
+            for &vertex in face {
+                stays[vertex as usize] = true;
+                stays[mesh.original(vertex) as usize] = true;
+            }
+        }
+        for corner in self.triangles.iter().flatten().chain(self.copies.iter().map(|copy| &copy.0)) {
+            if let Corner::Old(vertex) = corner {
+                stays[*vertex as usize] = true;
+            }
+        }
+        stays
+    }
+}
+
+/// Keeps the values that stay, in their order.
+fn keep<T>(values: &mut Vec<T>, stays: &[bool]) {
+    let mut stays = stays.iter();
+    values.retain(|_| stays.next().is_some_and(|stays| *stays));
+}
+
+/// Keeps the values that stay, and puts new ones at a place.
+fn exchange<T>(values: &mut Vec<T>, stays: &[bool], at: usize, new: Vec<T>) {
+    keep(values, stays);
+    values.reserve_exact(new.len());
+    values.splice(at..at, new);
 }

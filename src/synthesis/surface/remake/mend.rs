@@ -105,17 +105,13 @@ impl Site<'_> {
         }
         let patch = within(contour::outline(&cones, &inner, step)?, &inner);
         let patch_rim = Rim::of(patch.triangles.iter().map(|triangle| &triangle[..]))?;
-        let mut is_fixed = vec![false; patch.positions.len()];
-        patch_rim.loops.iter().flatten().for_each(|&vertex| is_fixed[vertex as usize] = true);
-        let mut smoothed = patch.clone();
-        smooth(&mut smoothed, &cones, step, &is_fixed);
         // New vertices are numbered from the mesh's own on.
         let first = self.mesh.unique() as u32;
         let patch_rim = patch_rim.numbered_from(first);
         let place = |outline: &Outline| -> Vec<Vec3> {
             outline.positions.iter().map(|&position| position + self.plan.origin).collect()
         };
-        let mut positions = place(&smoothed);
+        let mut positions = place(&patch);
         let position = |positions: &[Vec3], vertex: u32| match vertex.checked_sub(first) {
             None => self.mesh.positions[vertex as usize],
             Some(new) => positions[new as usize],
@@ -134,11 +130,16 @@ impl Site<'_> {
         let is_beside = |face: &u32| self.corners(*face).iter().any(|vertex| edge.binary_search(vertex).is_ok());
         all.extend(near.iter().filter(|face| stays(face) && is_beside(face)).flat_map(|&face| self.triangles(face)));
         if any_meet(&all, |vertex| position(&positions, vertex)) {
-            // In a narrow crease, smoothing may push one side through the other.
-            positions = place(&patch);
-            if any_meet(&all, |vertex| position(&positions, vertex)) {
-                return None;
-            }
+            return None;
+        }
+        let mut is_fixed = vec![false; patch.positions.len()];
+        patch_rim.loops.iter().flatten().for_each(|&vertex| is_fixed[(vertex - first) as usize] = true);
+        let mut smoothed = patch;
+        smooth(&mut smoothed, &cones, step, &is_fixed);
+        let smoothed = place(&smoothed);
+        // In a narrow crease, smoothing may push one side through the other.
+        if !any_meet(&all, |vertex| position(&smoothed, vertex)) {
+            positions = smoothed;
         }
         Some(Graft { faces, positions, triangles, cones })
     }
