@@ -268,15 +268,15 @@ impl Drains {
         }
     }
 
-    /// Notifies a drain of a new open node with a segment in the given `direction`. Of two nodes at equal distance, the
-    /// older stays.
-    pub fn hear(&mut self, heard: Heard, position: Vec3, direction: Vec3) {
+    /// Notifies a drain of a new open node. `cos` gives the cosine of the angle between the node's direction and that in
+    /// which it sees a drain. Of two nodes at equal distance, the older stays.
+    pub fn hear(&mut self, heard: Heard, cos: impl Fn(Vec3) -> f32) {
         let Heard { node, drain: slot, distance } = heard;
         let own = &mut self.hearing[slot as usize];
         own.closest = own.closest.min(distance);
         if distance < own.distance {
             self.detach(slot);
-            let cos = cos_at(direction, position, self.grid.point(slot));
+            let cos = cos(self.grid.point(slot));
             self.attach(slot, node, distance, cos);
             let state = &mut self.states[slot as usize];
             if *state == State::Asleep {
@@ -315,12 +315,4 @@ impl Drains {
         }
         self.hearing[slot as usize].node = NONE;
     }
-}
-
-/// The cosine of a drain on the node itself, which counts as in front of it.
-pub(crate) const ON_THE_NODE: f32 = 2.0;
-
-/// Cosine of the angle between a direction and the direction from a node to a drain.
-pub(crate) fn cos_at(direction: Vec3, node: Vec3, drain: Vec3) -> f32 {
-    (drain - node).try_normalize().map_or(ON_THE_NODE, |toward| direction.dot(toward).clamp(-1.0, 1.0))
 }

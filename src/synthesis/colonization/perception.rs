@@ -1,7 +1,7 @@
 //! Which node perceives a drain: open nodes, their perception volumes, and the drains of each node.
 
-use super::drains::{Drains, Found, ON_THE_NODE, cos_at};
-use super::forest::Forest;
+use super::drains::{Drains, Found};
+use super::forest::{Forest, ON_THE_NODE};
 use super::lengths::Lengths;
 use crate::synthesis::parallel;
 use bevy_math::{Vec3, ops};
@@ -80,8 +80,7 @@ fn nearest_open(forest: &Forest, lengths: &Lengths, center: Vec3) -> Found {
         forest.index().nearest_two(center, lengths.reach(), lengths.influence, |node| is_open(forest, lengths, node));
     let mut found = Found { closest, ..Found::default() };
     if let Some((node, distance)) = nearest {
-        let index = node as usize;
-        let cos = cos_at(forest.directions[index], forest.tree.positions()[index], center);
+        let cos = forest.cos_to(node, center);
         found = Found { node: Some(node), distance, cos, ..found };
     }
     found
@@ -129,8 +128,7 @@ pub(super) fn assert_none_sleeps_in(forest: &Forest, lengths: &Lengths, drains: 
     let asked = drains.slots().filter_map(|drain| {
         let hearing = drains.hearing(drain);
         let node = hearing.node().filter(|_| hearing.distance <= reach)?;
-        let (position, direction) = (forest.tree.positions()[node as usize], forest.directions[node as usize]);
-        let cos = cos_at(direction, position, drains.position(drain));
+        let cos = forest.cos_to(node, drains.position(drain));
         perceives(forest, lengths, node, cos, &mut SproutAngle::default()).then_some(Pull { node, drain })
     });
     let mut expected: Vec<Pull> = asked.collect();

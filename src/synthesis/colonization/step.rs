@@ -49,6 +49,7 @@ impl<'a> Step<'a> {
         candidates: &Candidates,
         vacancy: &mut Vacancy,
     ) -> (u32, SystemReport) {
+        self.enter_stage(arteries);
         let mut born = 0;
         for candidate in candidates.iter() {
             if let Some(drain) = arteries.offer_drain(candidate) {
@@ -66,12 +67,21 @@ impl<'a> Step<'a> {
     pub fn grow_veins(self, veins: &mut SystemGrowth, supplied: &[Supplied], links: &mut Vec<BedLink>) -> SystemReport {
         let mut report = SystemReport::default();
         if !veins.forest.tree.is_empty() {
+            self.enter_stage(veins);
             veins.receive(supplied);
             report = veins.grow(self.ground(), self.number);
             links.extend(veins.links());
         }
         veins.advance_tissue(self.number);
         report
+    }
+
+    /// If another tissue is in force from this step on, lets a system take it up.
+    fn enter_stage(self, system: &mut SystemGrowth) {
+        let before = self.tissue.at_step(self.number.saturating_sub(1).max(1));
+        if !std::ptr::addr_eq(before, self.tissue.at_step(self.number)) {
+            system.stand_on(self.ground());
+        }
     }
 
     /// The tissue and rules for placing new nodes.

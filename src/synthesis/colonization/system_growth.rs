@@ -29,20 +29,42 @@ pub(crate) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// Place of the end of a new segment; `None` if its middle or end is forbidden.
-    fn place(&self, from: Vec3, to: Vec3) -> Option<TissuePoint> {
-        let end = self.confined(to);
-        let forbidden = |point| self.no_go.is_some_and(|no_go| no_go.forbids(point));
-        (!forbidden(end.position) && !forbidden(from.midpoint(end.position))).then_some(end)
+    /// Where a vessel comes to that grows from a point by a step; `None` if there is no way, or the middle or end of one
+    /// of its segments is forbidden.
+    fn place(&self, from: &TissuePoint, direction: Vec3, lengths: &Lengths) -> Option<Tip> {
+        let forbids = |point| self.no_go.is_some_and(|no_go| no_go.forbids(point));
+        let (mut end, mut bends, mut forbidden, mut before) = (None, 0, false, from.position);
+        self.walk(from, direction, lengths, &mut |place| {
+            forbidden |= forbids(place.position) || forbids(before.midpoint(place.position));
+            bends += u32::from(end.replace(place).is_some());
+            before = place.position;
+        });
+        let tip = end.map(|end| Tip { end, bend: (bends > 0).then_some(direction) });
+        tip.filter(|_| !forbidden)
     }
 
-    fn confined(&self, position: Vec3) -> TissuePoint {
+    /// Calls `arrive` for the end of each segment of a step.
+    fn walk(&self, from: &TissuePoint, direction: Vec3, lengths: &Lengths, arrive: &mut dyn FnMut(TissuePoint)) {
         if self.confine {
-            return self.tissue.closest_point(position);
+            return self.tissue.walk(from, direction, lengths.step, lengths.bend_tolerance(), arrive);
         }
+        let position = from.position + direction * lengths.step;
         let normal = if self.normals { self.tissue.closest_point(position).normal } else { Vec3::ZERO };
-        TissuePoint { position, normal }
+        arrive(TissuePoint::new(position, normal));
     }
+
+    /// A point as the start of vessels that may leave the tissue, or may not.
+    fn start(&self, at: TissuePoint) -> TissuePoint {
+        TissuePoint { facet: at.facet.filter(|_| self.confine), ..at }
+    }
+}
+
+/// The end of a step.
+#[derive(Clone, Copy, Debug)]
+struct Tip {
+    end: TissuePoint,
+    /// The direction of a way that bends before its end.
+    bend: Option<Vec3>,
 }
 
 /// A drain that a vessel has supplied.
@@ -56,11 +78,11 @@ pub(crate) struct Supplied {
     pub node: u32,
 }
 
-/// A growing node, and the ends of its new segments, at most two.
+/// A growing node, and the ends of its steps, at most two.
 #[derive(Clone, Copy, Debug, Default)]
 struct Growing {
     node: u32,
-    tips: [Option<TissuePoint>; 2],
+    tips: [Option<Tip>; 2],
 }
 
 /// The forest and the drains of one system, with the lengths in force.
@@ -77,6 +99,8 @@ pub(crate) struct SystemGrowth {
     /// Ranges of pulls on the same node, and the growth of that node.
     pulled: Vec<Range<usize>>,
     growing: Vec<Growing>,
+    /// The places of a way that bends.
+    way: Vec<TissuePoint>,
     news: News,
     /// Drains supplied in the last step.
     supplied: Vec<Supplied>,
@@ -103,6 +127,7 @@ impl SystemGrowth {
             pulls: Vec::new(),
             pulled: Vec::new(),
             growing: Vec::new(),
+            way: Vec::new(),
             news: News::default(),
             supplied: Vec::new(),
             givers: Vec::new(),
@@ -125,13 +150,13 @@ impl SystemGrowth {
     /// Adds roots, and given trees.
     pub fn plant(&mut self, roots: &[TissuePoint], given: Option<&VesselTree>, ground: Ground<'_>) {
         for &root in roots {
-            self.forest.add_root(root, self.settings.terminal_radius);
+            self.forest.add_root(ground.start(root), self.settings.terminal_radius);
         }
         let first = self.forest.tree.len() as u32;
         if let Some(tree) = given {
             for (node, &parent) in tree.parents().iter().enumerate() {
                 let (position, radius) = (tree.positions()[node], tree.radii()[node]);
-                let at = TissuePoint { position, normal: ground.tissue.closest_point(position).normal };
+                let at = ground.start(ground.tissue.point_at(position));
                 match parent {
                     NO_PARENT => self.forest.add_root(at, radius),
                     parent => self.forest.add_given(first + parent, at, radius),
@@ -190,7 +215,7 @@ impl SystemGrowth {
         self.forest.set_tip_radius(self.lengths.terminal_radius);
         perception::associate(&self.forest, &self.lengths, &mut self.drains, &mut self.search, &mut self.pulls);
         self.decide(ground);
-        self.extend(step);
+        self.extend(ground, step);
         self.spread_news(first_new);
         self.kill();
         SystemReport {
@@ -212,9 +237,9 @@ impl SystemGrowth {
         parallel::map_into(pulled, growing, Growing::default(), |range| {
             let pulls = &pulls[range.clone()];
             let node = pulls[0].node;
-            let position = forest.tree.positions()[node as usize];
-            let place = |direction: Vec3| ground.place(position, position + direction * lengths.step);
-            let drains = pulls.iter().map(|pull| drains.position(pull.drain));
+            let at = forest.point(node);
+            let place = |direction: Vec3| ground.place(&at, direction, lengths);
+            let drains = pulls.iter().map(|pull| forest.sight(node, drains.position(pull.drain)));
             let tips = match decide(forest, lengths, node, drains) {
                 Decision::Extend(direction) => [place(direction), None],
                 Decision::Bifurcate(directions) => directions.map(place),
@@ -225,16 +250,34 @@ impl SystemGrowth {
     }
 
     /// Adds the decided segments, except those that would end on another node or at no place.
-    fn extend(&mut self, step: u32) {
-        let Self { forest, lengths, growing, .. } = self;
+    fn extend(&mut self, ground: Ground<'_>, step: u32) {
+        let Self { forest, lengths, growing, way, .. } = self;
         for growing in growing {
-            for &tip in growing.tips.iter().flatten() {
-                let free = tip.position.is_finite()
-                    && !forest.index().any_within(tip.position, LEAST_SEPARATION * lengths.step);
-                if free {
-                    forest.add_tip(growing.node, tip, step);
+            for &Tip { end, bend } in growing.tips.iter().flatten() {
+                way.clear();
+                match bend {
+                    None => way.push(end),
+                    Some(direction) => {
+                        ground.walk(&forest.point(growing.node), direction, lengths, &mut |place| way.push(place));
+                    }
+                }
+                let is_free = |place: &TissuePoint| {
+                    place.position.is_finite()
+                        && !forest.index().any_within(place.position, LEAST_SEPARATION * lengths.step)
+                };
+                if way.iter().all(is_free) {
+                    let mut node = growing.node;
+                    way.iter().for_each(|&place| node = forest.add_tip(node, place, step));
                 }
             }
+        }
+    }
+
+    /// Takes up another tissue, on which drains are seen in other directions.
+    pub fn stand_on(&mut self, ground: Ground<'_>) {
+        if ground.confine {
+            self.forest.stand_on(ground.tissue);
+            self.drains.wake_all();
         }
     }
 
@@ -249,7 +292,7 @@ impl SystemGrowth {
         forest.sum_up(|node| drains.wake(node, false));
         news.spread(drains, first_new, &forest.tree.positions()[first_new as usize..], lengths.reach());
         for heard in news.iter() {
-            drains.hear(heard, forest.tree.positions()[heard.node as usize], forest.directions[heard.node as usize]);
+            drains.hear(heard, |drain| forest.cos_to(heard.node, drain));
         }
     }
 

@@ -5,7 +5,8 @@ use super::{
     triangle_mesh::{doubled_normal, is_degenerate},
 };
 use crate::synthesis::pace::{Pace, Stretch, at_once};
-use std::collections::VecDeque;
+use bevy_math::{DVec3, Vec3};
+use std::{collections::VecDeque, num::NonZeroU32};
 
 /// An edge between two welded vertices, in one of its triangles. Their order puts uses of the same edge side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,23 +38,31 @@ impl TriangleMesh {
     /// The same as [paced](crate::synthesis::pace) work.
     pub async fn topology_paced(&self, pace: &Pace) -> MeshTopology {
         let welding = self.weld_paced(&pace.part(0.0..0.2)).await;
-        let mut edges = Vec::with_capacity(3 * self.triangles().len());
-        let mut triangles = Vec::with_capacity(self.triangles().len());
+        let mut numbers = Vec::with_capacity(self.triangles().len());
         let take = |triangle: usize| {
-            if is_degenerate(self.corners(triangle)) {
-                triangles.push(None);
-                return;
-            }
-            let corners = self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32);
-            triangles.push(Some(corners));
-            for side in 0..3 {
-                let (from, to) = (corners[side], corners[(side + 1) % 3]);
-                let key = u64::from(from.min(to)) << 32 | u64::from(from.max(to));
-                edges.push(EdgeUse { key, triangle: triangle as u32, forward: from < to });
+            if !is_degenerate(self.corners(triangle)) {
+                numbers.push(triangle as u32);
             }
         };
-        pace.part(0.2..0.3).each(self.triangles().len(), take).await;
-        pace.part(0.3..1.0).sort(&mut edges).await;
+        pace.part(0.2..0.25).each(self.triangles().len(), take).await;
+        self.topology_of_paced(welding, &numbers, &pace.part(0.25..1.0)).await
+    }
+
+    /// The topology of the triangles with these numbers, none of which is degenerate. The others don't count.
+    pub(crate) async fn topology_of_paced(&self, welding: Welding, numbers: &[u32], pace: &Pace) -> MeshTopology {
+        let mut edges = Vec::with_capacity(3 * numbers.len());
+        let mut triangles = vec![None; self.triangles().len()];
+        let take = |place: usize| {
+            let triangle = numbers[place] as usize;
+            let corners = self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32);
+            triangles[triangle] = Some(corners);
+            for side in 0..3 {
+                let (from, to) = (corners[side], corners[(side + 1) % 3]);
+                edges.push(EdgeUse { key: edge_key(from, to), triangle: triangle as u32, forward: from < to });
+            }
+        };
+        pace.part(0.0..0.1).each(numbers.len(), take).await;
+        pace.part(0.1..1.0).sort(&mut edges).await;
         MeshTopology { welding, triangles, edges }
     }
 
@@ -205,6 +214,37 @@ impl MeshTopology {
         (patches, closed)
     }
 
+    /// What lies across each side of each triangle. Side k runs from corner k to the next.
+    ///
+    /// Of several triangles at a common edge, it is the one that continues a triangle most straightly.
+    pub(crate) async fn neighbours(&self, mesh: &TriangleMesh, pace: &Pace) -> Vec<[Option<Across>; 3]> {
+        let mut neighbours = vec![[None; 3]; self.triangles.len()];
+        let (mut stretch, mut done) = (Stretch::default(), 0);
+        for fan in self.fans() {
+            let sides = || fan.iter().filter_map(|edge| Some((edge.triangle, self.side_at(edge)?)));
+            for (triangle, side) in sides() {
+                let inward = inward(mesh.corners(triangle as usize), side);
+                let turn = |&(other, side): &(u32, usize)| {
+                    if fan.len() == 2 { 0.0 } else { inward.dot(self::inward(mesh.corners(other as usize), side)) }
+                };
+                let straightest = sides().filter(|&(other, _)| other != triangle);
+                let straightest = straightest.min_by(|a, b| turn(a).total_cmp(&turn(b)));
+                neighbours[triangle as usize][side] = straightest.map(|(triangle, side)| Across::new(triangle, side));
+            }
+            done += fan.len();
+            if stretch.ends_after(fan.len()) {
+                pace.rest(done as f32 / self.edges.len() as f32).await;
+            }
+        }
+        neighbours
+    }
+
+    /// The side of a triangle that uses an edge.
+    fn side_at(&self, edge: &EdgeUse) -> Option<usize> {
+        let corners = self.triangles[edge.triangle as usize]?;
+        (0..3).find(|&side| edge_key(corners[side], corners[(side + 1) % 3]) == edge.key)
+    }
+
     /// The uses of each edge.
     fn fans(&self) -> impl Iterator<Item = &[EdgeUse]> {
         self.edges.chunk_by(|a, b| a.key == b.key)
@@ -279,6 +319,36 @@ impl MeshTopology {
     }
 }
 
+/// Both ends of an edge, the lower vertex first.
+fn edge_key(from: u32, to: u32) -> u64 {
+    u64::from(from.min(to)) << 32 | u64::from(from.max(to))
+}
+
+/// A triangle, and the side on which it is entered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Across(NonZeroU32);
+
+impl Across {
+    fn new(triangle: u32, side: usize) -> Self {
+        // There are at most 2²⁶ triangles.
+        Self(NonZeroU32::MIN.saturating_add(triangle << 2 | side as u32))
+    }
+
+    pub fn triangle(self) -> u32 {
+        (self.0.get() - 1) >> 2
+    }
+
+    pub fn side(self) -> usize {
+        ((self.0.get() - 1) & 3) as usize
+    }
+}
+
+/// Unit vector in a triangle's plane, perpendicular to one of its sides, to the inside.
+pub(crate) fn inward(corners: [Vec3; 3], side: usize) -> DVec3 {
+    let along = corners[(side + 1) % 3].as_dvec3() - corners[side].as_dvec3();
+    doubled_normal(corners).cross(along).normalize_or_zero()
+}
+
 /// Parts of a surface.
 pub(crate) struct Patches {
     /// The part of every triangle, `None` if it is degenerate.
@@ -291,7 +361,6 @@ pub(crate) struct Patches {
 mod tests {
     use super::*;
     use crate::synthesis::mesh::MeshError;
-    use bevy_math::Vec3;
 
     /// A tetrahedron in which every triangle has vertices of its own.
     fn soup() -> Result<TriangleMesh, MeshError> {

@@ -113,7 +113,7 @@ fn exact(tissue: &dyn Tissue, kind: VesselKind, points: &[Vec3], reach: f32) -> 
         if distance > reach {
             return Err(RootError::TooFar { kind, position, distance, reach });
         }
-        Ok(TissuePoint { position, normal: closest.normal })
+        Ok(tissue.point_at(position))
     };
     points.iter().map(place).collect()
 }

@@ -236,7 +236,7 @@ impl Tissue for MeshVolume {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         let position = if self.contains(point) { point } else { self.bring_in(point).unwrap_or(point) };
-        TissuePoint { position, normal: Vec3::ZERO }
+        TissuePoint::new(position, Vec3::ZERO)
     }
 
     fn depth(&self, point: Vec3) -> Option<f32> {

@@ -88,7 +88,7 @@ impl Tissue for Disc {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         let position = self.at(self.local(point).0.clamp_length_max(self.radius));
-        TissuePoint { position, normal: self.normal }
+        TissuePoint::new(position, self.normal)
     }
 
     fn depth(&self, point: Vec3) -> Option<f32> {
@@ -224,7 +224,7 @@ impl Tissue for Rectangle {
     }
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
-        TissuePoint { position: self.nearest(point), normal: self.normal() }
+        TissuePoint::new(self.nearest(point), self.normal())
     }
 
     fn depth(&self, point: Vec3) -> Option<f32> {
