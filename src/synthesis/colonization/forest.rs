@@ -1,5 +1,6 @@
 //! The forest of one system while it grows: the tree, with further data of each node for growth.
 
+use super::drains::Attraction;
 use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::tissue::{Facet, Tissue, TissuePoint};
 use crate::synthesis::tree::murray;
@@ -52,6 +53,9 @@ pub(crate) const ON_THE_NODE: f32 = 2.0;
 fn cos_at(direction: Vec3, node: Vec3, drain: Vec3) -> f32 {
     (drain - node).try_normalize().map_or(ON_THE_NODE, |toward| direction.dot(toward).clamp(-1.0, 1.0))
 }
+
+/// Cosine of the angle between two facets from which each lies on the other side of a wall.
+const AVERTED: f32 = -0.5;
 
 /// Share of the squared way to a drain that must be along a facet.
 const STEEP: f32 = 1e-6;
@@ -154,10 +158,8 @@ impl Forest {
 
     /// Finds the facets of all nodes anew, on another tissue.
     pub fn stand_on(&mut self, tissue: &dyn Tissue) {
-        let facet = |&position: &Vec3| tissue.point_at(position).facet;
-        let curved = self.tree.positions().first().is_some_and(|first| facet(first).is_some());
-        for (position, own) in self.tree.positions().iter().zip(&mut self.facets) {
-            *own = if curved { facet(position) } else { None };
+        for (&position, own) in self.tree.positions().iter().zip(&mut self.facets) {
+            *own = if tissue.has_facets() { tissue.point_at(position).facet } else { None };
         }
     }
 
@@ -172,10 +174,16 @@ impl Forest {
         if square > STEEP * way.length_squared() { position + along * (way.length() / square.sqrt()) } else { drain }
     }
 
-    /// Cosine of the angle between a node's direction and that in which it sees a drain.
-    pub fn cos_to(&self, node: u32, drain: Vec3) -> f32 {
+    /// Whether a node sees a drain: on a surface not if it lies behind, on the other side of a wall.
+    pub fn sees(&self, node: u32, drain: Attraction) -> bool {
+        self.facets[node as usize].is_none_or(|facet| facet.normal.dot(drain.side) > AVERTED)
+    }
+
+    /// Cosine of the angle between a node's direction and that in which it sees a drain; `None` if it doesn't see it.
+    pub fn cos_to(&self, node: u32, drain: Attraction) -> Option<f32> {
         let index = node as usize;
-        cos_at(self.directions[index], self.tree.positions()[index], self.sight(node, drain))
+        let cos = || cos_at(self.directions[index], self.tree.positions()[index], self.sight(node, drain.position));
+        self.sees(node, drain).then(cos)
     }
 
     /// r^κ of a radius in units of the terminal one.

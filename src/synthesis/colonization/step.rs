@@ -52,13 +52,13 @@ impl<'a> Step<'a> {
         self.enter_stage(arteries);
         let mut born = 0;
         for candidate in candidates.iter() {
-            if let Some(drain) = arteries.offer_drain(candidate) {
+            if let Some(drain) = arteries.offer_drain(candidate, self.ground()) {
                 vacancy.add_drain(drain, candidate);
                 born += 1;
             }
         }
         let report = arteries.grow(self.ground(), self.number);
-        arteries.supplied().iter().for_each(|supplied| vacancy.remove_drain(supplied.drain, supplied.position));
+        arteries.supplied().iter().for_each(|supplied| vacancy.remove_drain(supplied.drain, supplied.at.position));
         arteries.advance_tissue(self.number);
         (born, report)
     }

@@ -1,7 +1,7 @@
 //! One growth step of one system: associate, grow, kill (Rauch & Harders 2021, section 3).
 
 use super::direction::{Decision, decide};
-use super::drains::{Drains, News};
+use super::drains::{Attraction, Drains, News};
 use super::forest::Forest;
 use super::lengths::Lengths;
 use super::perception::{self, Pull, Search};
@@ -53,6 +53,13 @@ impl Ground<'_> {
         arrive(TissuePoint::new(position, normal));
     }
 
+    /// Normal of the facet at a place of the tissue, zero without one.
+    fn side(&self, position: Vec3) -> Vec3 {
+        let seeks = self.confine && self.tissue.has_facets();
+        let facet = if seeks { self.tissue.closest_point(position).facet } else { None };
+        facet.map_or(Vec3::ZERO, |facet| facet.normal)
+    }
+
     /// A point as the start of vessels that may leave the tissue, or may not.
     fn start(&self, at: TissuePoint) -> TissuePoint {
         TissuePoint { facet: at.facet.filter(|_| self.confine), ..at }
@@ -72,8 +79,8 @@ struct Tip {
 pub(crate) struct Supplied {
     /// Its old slot.
     pub drain: u32,
-    /// Its position.
-    pub position: Vec3,
+    /// Its place.
+    pub at: Attraction,
     /// The node that supplied it: its nearest open one.
     pub node: u32,
 }
@@ -181,15 +188,15 @@ impl SystemGrowth {
     }
 
     /// Makes a candidate that has not been refused a drain, unless one has been born too near it meanwhile.
-    pub fn offer_drain(&mut self, candidate: Vec3) -> Option<u32> {
+    pub fn offer_drain(&mut self, candidate: Vec3, ground: Ground<'_>) -> Option<u32> {
         let room = !self.drains.index().any_within(candidate, self.lengths.drain_birth);
-        room.then(|| self.drains.add(candidate))
+        room.then(|| self.drains.add(Attraction { position: candidate, side: ground.side(candidate) }))
     }
 
     /// Takes drains that the other system has supplied.
     pub fn receive(&mut self, supplied: &[Supplied]) {
         for supplied in supplied {
-            let slot = self.drains.add(supplied.position) as usize;
+            let slot = self.drains.add(supplied.at) as usize;
             if slot == self.givers.len() {
                 self.givers.push(supplied.node);
             } else {
@@ -277,7 +284,7 @@ impl SystemGrowth {
     pub fn stand_on(&mut self, ground: Ground<'_>) {
         if ground.confine {
             self.forest.stand_on(ground.tissue);
-            self.drains.wake_all();
+            self.drains.turn(|position| ground.side(position));
         }
     }
 
@@ -302,8 +309,8 @@ impl SystemGrowth {
         let reach = self.lengths.kill * self.lengths.kill;
         for &Pull { drain, node } in &self.pulls {
             if self.drains.hearing(drain).closest <= reach {
-                let (position, node) = (self.drains.position(drain), self.drains.hearing(drain).node().unwrap_or(node));
-                self.supplied.push(Supplied { drain, position, node });
+                let (at, node) = (self.drains.attraction(drain), self.drains.hearing(drain).node().unwrap_or(node));
+                self.supplied.push(Supplied { drain, at, node });
                 self.drains.remove(drain);
             }
         }
@@ -349,6 +356,7 @@ impl SystemGrowth {
             let at = self.drains.position(drain);
             let nearest = (0..positions.len() as u32)
                 .filter(|&node| perception::is_open(&self.forest, &self.lengths, node))
+                .filter(|&node| self.forest.sees(node, self.drains.attraction(drain)))
                 .map(|node| (positions[node as usize].distance_squared(at), node))
                 .filter(|&(distance, _)| distance <= reach)
                 .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

@@ -25,7 +25,8 @@ const LINKS: NonZeroUsize = NonZeroUsize::new(12).expect("12 is not zero");
 const GAP: f32 = 0.15;
 /// Points of a link that must be in the tissue, or this near to it.
 const BETWEEN: u32 = 5;
-/// Cosine of the angle between one normal and the opposite of the other from which two walls face each other.
+/// Cosine of the angle between one normal and the opposite of the other from which two sides face each other, or away
+/// from each other.
 const FACING: f32 = 0.5;
 /// Reach of one of several roots, as a share of that of a single one: a tissue that needs several is narrow, and
 /// vessels advance more slowly in a narrow tissue.
@@ -146,9 +147,9 @@ fn nearest_pairs(samples: &[TissuePoint]) -> Vec<(u32, u32)> {
 /// Whether the tissue continues between two of its points, without a gap that vessels would have to cross.
 fn leads_through(tissue: &dyn Tissue, [from, to]: [TissuePoint; 2]) -> bool {
     let way = to.position - from.position;
-    // Two facing walls, such as those of two folds, may be nearer than samples are.
+    // Two facing walls, such as those of two folds, may be nearer than samples are, and so may the two sides of one wall.
     let opposite = from.normal.dot(to.normal) < -FACING;
-    if opposite && from.normal.dot(way) > 0.0 && to.normal.dot(way) < 0.0 {
+    if opposite && from.normal.dot(way) * to.normal.dot(way) < 0.0 {
         return false;
     }
     let allowed = GAP * way.length();

@@ -174,6 +174,10 @@ impl Tissue for DensityTissue {
         self.tissue.closest_point(point)
     }
 
+    fn has_facets(&self) -> bool {
+        self.tissue.has_facets()
+    }
+
     fn walk(
         &self,
         from: &TissuePoint,

@@ -124,6 +124,11 @@ pub trait Tissue: Debug + Send + Sync {
     /// The point of the tissue nearest to `point`: `point` itself if the tissue contains it.
     fn closest_point(&self, point: Vec3) -> TissuePoint;
 
+    /// Whether points of the tissue lie on [facets](TissuePoint::facet).
+    fn has_facets(&self) -> bool {
+        false
+    }
+
     /// Goes a `length` from a point of the tissue in a unit direction, keeping to the tissue. Calls `arrive` for each
     /// place where the way bends, then for its end.
     ///

@@ -229,6 +229,10 @@ impl Tissue for GuidePath {
         if self.contains(found.position) { found } else { self.on_base(foot.position) }
     }
 
+    fn has_facets(&self) -> bool {
+        self.base.as_ref().is_some_and(|base| base.has_facets())
+    }
+
     /// Towards the point of the tube nearest to the straight end, along the tissue that the guide is laid on.
     fn walk(
         &self,

@@ -169,6 +169,10 @@ impl Tissue for MeshSurface {
         }
     }
 
+    fn has_facets(&self) -> bool {
+        true
+    }
+
     fn walk(
         &self,
         from: &TissuePoint,

@@ -56,6 +56,10 @@ impl Tissue for NoGoTissue {
         self.tissue.closest_point(point)
     }
 
+    fn has_facets(&self) -> bool {
+        self.tissue.has_facets()
+    }
+
     fn walk(
         &self,
         from: &TissuePoint,
