@@ -174,16 +174,27 @@ impl Forest {
         if square > STEEP * way.length_squared() { position + along * (way.length() / square.sqrt()) } else { drain }
     }
 
-    /// Whether a node sees a drain: on a surface not if it lies behind, on the other side of a wall.
-    pub fn sees(&self, node: u32, drain: Attraction) -> bool {
-        self.facets[node as usize].is_none_or(|facet| facet.normal.dot(drain.side) > AVERTED)
+    /// Whether a node sees a drain on a side of the tissue's surface, of which the normal is given: not if it lies behind,
+    /// on the other side of a wall.
+    pub fn sees(&self, node: u32, side: Vec3) -> bool {
+        self.facets[node as usize].is_none_or(|facet| facet.normal.dot(side) > AVERTED)
+    }
+
+    /// Whether a point lies rather above or below a node's facet than beside the node, so that it may be on the other side
+    /// of a wall.
+    pub fn is_steep(&self, node: u32, point: Vec3) -> bool {
+        let way = point - self.tree.positions()[node as usize];
+        self.facets[node as usize].is_some_and(|facet| {
+            let height = way.dot(facet.normal);
+            2.0 * height * height > way.length_squared()
+        })
     }
 
     /// Cosine of the angle between a node's direction and that in which it sees a drain; `None` if it doesn't see it.
     pub fn cos_to(&self, node: u32, drain: Attraction) -> Option<f32> {
         let index = node as usize;
         let cos = || cos_at(self.directions[index], self.tree.positions()[index], self.sight(node, drain.position));
-        self.sees(node, drain).then(cos)
+        self.sees(node, drain.side).then(cos)
     }
 
     /// r^κ of a radius in units of the terminal one.

@@ -77,7 +77,7 @@ impl Search {
 /// The nearest open node within the influence distance that sees a drain, and the distance to the nearest node of any
 /// kind.
 fn nearest_open(forest: &Forest, lengths: &Lengths, drain: Attraction) -> Found {
-    let accepts = |node| is_open(forest, lengths, node) && forest.sees(node, drain);
+    let accepts = |node| is_open(forest, lengths, node) && forest.sees(node, drain.side);
     let (nearest, closest) = forest.index().nearest_two(drain.position, lengths.reach(), lengths.influence, accepts);
     let found = nearest.and_then(|(node, distance)| {
         let cos = forest.cos_to(node, drain)?;

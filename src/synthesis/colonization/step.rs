@@ -29,11 +29,13 @@ impl<'a> Step<'a> {
     ) {
         // A staged tissue changes from stage to stage, and has no pieces of its own.
         if self.tissue.stage(1).is_none() {
-            let (nodes, drains) = (arteries.forest.tree.positions(), arteries.drains.living());
+            let (forest, drains) = (&arteries.forest, arteries.drains.living());
+            let nodes = (forest.tree.positions(), |node, side| forest.sees(node, side));
             vacancy.prepare(self.tissue, arteries.length_scale(), nodes, drains);
         }
         self.draw(draws, vacancy.chosen());
-        candidates.take(draws, &self.tissue.bounds(), |some, refused| arteries.refuse(some, refused));
+        let ground = self.ground();
+        candidates.take(draws, &self.tissue.bounds(), |some, refused| arteries.refuse(some, ground, refused));
     }
 
     /// Draws candidates, unless it has been done before.

@@ -53,10 +53,14 @@ impl Ground<'_> {
         arrive(TissuePoint::new(position, normal));
     }
 
+    /// Whether vessels keep to one side of a surface.
+    fn has_sides(&self) -> bool {
+        self.confine && self.tissue.has_facets()
+    }
+
     /// Normal of the facet at a place of the tissue, zero without one.
     fn side(&self, position: Vec3) -> Vec3 {
-        let seeks = self.confine && self.tissue.has_facets();
-        let facet = if seeks { self.tissue.closest_point(position).facet } else { None };
+        let facet = if self.has_sides() { self.tissue.closest_point(position).facet } else { None };
         facet.map_or(Vec3::ZERO, |facet| facet.normal)
     }
 
@@ -176,14 +180,31 @@ impl SystemGrowth {
 
     /// Marks candidates that cannot become drains: those in supplied tissue, within the birth distance of a node, or too near
     /// a drain.
-    pub fn refuse(&self, candidates: &[Vec3], refused: &mut [bool]) {
+    pub fn refuse(&self, candidates: &[Vec3], ground: Ground<'_>, refused: &mut [bool]) {
         let (nodes, drains) = (self.forest.index(), self.drains.index());
         let Lengths { node_birth, drain_birth, .. } = self.lengths;
         // Quick tests first.
         drains.mark_beside(candidates, drain_birth, refused);
-        nodes.mark_beside(candidates, node_birth, refused);
+        let has_sides = ground.has_sides();
+        if !has_sides {
+            nodes.mark_beside(candidates, node_birth, refused);
+        }
         for (&candidate, refused) in candidates.iter().zip(refused).filter(|(_, refused)| !**refused) {
-            *refused = drains.any_within(candidate, drain_birth) || nodes.any_within(candidate, node_birth);
+            *refused = drains.any_within(candidate, drain_birth)
+                || nodes.any_within(candidate, node_birth) && (!has_sides || self.supplies(candidate, ground));
+        }
+    }
+
+    /// Whether a node within the birth distance of a place is on the same side of the surface.
+    fn supplies(&self, place: Vec3, ground: Ground<'_>) -> bool {
+        let (forest, reach) = (&self.forest, self.lengths.node_birth);
+        let mut beside = false;
+        forest.index().for_each_within(place, reach, |node, _| beside |= !forest.is_steep(node, place));
+        // A search for the side of the place is seldom needed.
+        beside || {
+            let (side, mut seen) = (ground.side(place), false);
+            forest.index().for_each_within(place, reach, |node, _| seen |= forest.sees(node, side));
+            seen
         }
     }
 
@@ -356,7 +377,7 @@ impl SystemGrowth {
             let at = self.drains.position(drain);
             let nearest = (0..positions.len() as u32)
                 .filter(|&node| perception::is_open(&self.forest, &self.lengths, node))
-                .filter(|&node| self.forest.sees(node, self.drains.attraction(drain)))
+                .filter(|&node| self.forest.sees(node, self.drains.attraction(drain).side))
                 .map(|node| (positions[node as usize].distance_squared(at), node))
                 .filter(|&(distance, _)| distance <= reach)
                 .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

@@ -213,13 +213,13 @@ impl Tissue for MeshSurface {
     fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
         for triangle in (0..self.mesh().triangles().len()).filter(|&triangle| !self.mesh().is_degenerate(triangle)) {
             let [a, b, c] = self.mesh().corners(triangle);
-            let parts = self.parts(triangle, reach);
+            let (parts, side) = (self.parts(triangle, reach), self.triangle_normal(triangle));
             let measure = self.mesh().triangle_area(triangle) as f32 / (parts * parts) as f32;
             for part in 0..parts * parts {
                 let corners = small_triangle(part, parts).map(|[v, w]| a + (b - a) * v + (c - a) * w);
                 let center = (corners[0] + corners[1] + corners[2]) / 3.0;
                 let reach = corners.iter().map(|corner| corner.distance(center)).fold(0.0, f32::max);
-                pieces.push(TissuePiece { center, reach, measure, id: [triangle as u32, part] });
+                pieces.push(TissuePiece { center, reach, measure, side, id: [triangle as u32, part] });
             }
         }
         true
