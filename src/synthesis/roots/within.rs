@@ -23,6 +23,8 @@ const LINKS: NonZeroUsize = NonZeroUsize::new(12).expect("12 is not zero");
 /// Largest distance of a link from the tissue, as a share of its length: more than a surface bends away below it, less
 /// than the gap between two folds.
 const GAP: f32 = 0.15;
+/// Distance by which a way along the tissue may miss the other end of a link, as a share of its length.
+const MISSED: f32 = 0.25;
 /// Points of a link that must be in the tissue, or this near to it.
 const BETWEEN: u32 = 5;
 /// Cosine of the angle between one normal and the opposite of the other from which two sides face each other, or away
@@ -152,7 +154,13 @@ fn leads_through(tissue: &dyn Tissue, [from, to]: [TissuePoint; 2]) -> bool {
     if opposite && from.normal.dot(way) * to.normal.dot(way) < 0.0 {
         return false;
     }
-    let allowed = GAP * way.length();
+    let length = way.length();
+    let mut end = from;
+    tissue.walk(&from, way / length, length, length, &mut |place| end = place);
+    if end.position.distance(to.position) > MISSED * length {
+        return false;
+    }
+    let allowed = GAP * length;
     (1..=BETWEEN).map(|step| from.position + way * (step as f32 / (BETWEEN + 1) as f32)).all(|between| {
         tissue.closest_point(between).position.distance_squared(between) <= allowed * allowed
             && !tissue.no_go().is_some_and(|no_go| no_go.forbids(between))

@@ -17,6 +17,9 @@ use std::sync::Arc;
 /// Distance from the surface, relative to the longest side of its box, within which a point counts as on it.
 pub const SURFACE_TOLERANCE: f32 = 1.0e-5;
 
+/// Most pieces that a surface is cut into, for each square of the reach and each triangle.
+const MOST_PIECES: f64 = 8.0;
+
 /// The triangles of a mesh, sampled uniformly by area.
 ///
 /// Points are drawn in constant time and projected through an index over the triangles.
@@ -25,6 +28,8 @@ pub struct MeshSurface {
     indexed: IndexedMesh,
     /// Unit normal of every vertex, pointing outwards.
     normals: Vec<Vec3>,
+    /// The triangles that make up the surface: none twice, and all with an area.
+    faces: Vec<u32>,
     /// Triangles whose corners are clockwise seen from outside.
     inward: Vec<bool>,
     neighbours: Neighbours,
@@ -72,6 +77,7 @@ impl MeshSurface {
         let normals = mesh.vertex_normals_paced(topology.welding(), normal, &pace.part(0.82..0.9)).await;
         Ok(Self {
             normals,
+            faces,
             inward,
             neighbours,
             area: pace.part(0.9..0.91).sum(areas.len(), |triangle| areas[triangle]).await as f32,
@@ -118,11 +124,6 @@ impl MeshSurface {
         if self.inward[triangle] { -normal } else { normal }
     }
 
-    fn tissue_point(&self, point: &SurfacePoint) -> TissuePoint {
-        let facet = Facet { number: point.triangle as u32, normal: self.triangle_normal(point.triangle) };
-        TissuePoint { position: point.position, normal: self.normal_at(point), facet: Some(facet) }
-    }
-
     /// Number of parts into which a triangle's sides are cut so that no small triangle exceeds `reach`.
     fn parts(&self, triangle: usize, reach: f32) -> u32 {
         let [a, b, c] = self.mesh().corners(triangle);
@@ -131,15 +132,17 @@ impl MeshSurface {
         pieces::parts(longest, 1.5 * reach)
     }
 
+    fn tissue_point(&self, point: &SurfacePoint) -> TissuePoint {
+        let facet = Facet { number: point.triangle as u32, normal: self.triangle_normal(point.triangle) };
+        TissuePoint { position: point.position, normal: self.normal_at(point), facet: Some(facet) }
+    }
+
     /// The point chosen by four uniform numbers: one for a slot of the table, one for keeping it, and two in the
     /// triangle.
     fn pick(&self, slot: u32, keep: f32, numbers: [f32; 2]) -> Vec3 {
-        self.point_in(self.picks.pick(slot, keep) as usize, numbers)
-    }
-
-    /// The point of a triangle chosen by two uniform numbers.
-    fn point_in(&self, triangle: usize, [mut v, mut w]: [f32; 2]) -> Vec3 {
+        let triangle = self.picks.pick(slot, keep) as usize;
         let [a, b, c] = self.mesh().corners(triangle);
+        let [mut v, mut w] = numbers;
         // Uniform over the parallelogram, with its far half folded back.
         if v + w > 1.0 {
             (v, w) = (1.0 - v, 1.0 - w);
@@ -209,17 +212,24 @@ impl Tissue for MeshSurface {
         }
     }
 
-    /// Triangles whose sides are too long for `reach` are cut into k² equal ones, by lines along their sides.
+    /// Triangles whose sides are too long for `reach` are cut into k² equal ones, by lines along their sides. A surface of
+    /// long thin triangles would take far more of these than its area asks for, and is not cut.
     fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
-        for triangle in (0..self.mesh().triangles().len()).filter(|&triangle| !self.mesh().is_degenerate(triangle)) {
+        let squares = |&face: &u32| f64::from(self.parts(face as usize, reach)).powi(2);
+        let asked = f64::from(self.area / (reach * reach)) + self.faces.len() as f64;
+        if self.faces.iter().map(squares).sum::<f64>() > MOST_PIECES * asked {
+            return false;
+        }
+        for &face in &self.faces {
+            let (triangle, side) = (face as usize, self.triangle_normal(face as usize));
             let [a, b, c] = self.mesh().corners(triangle);
-            let (parts, side) = (self.parts(triangle, reach), self.triangle_normal(triangle));
+            let parts = self.parts(triangle, reach);
             let measure = self.mesh().triangle_area(triangle) as f32 / (parts * parts) as f32;
             for part in 0..parts * parts {
                 let corners = small_triangle(part, parts).map(|[v, w]| a + (b - a) * v + (c - a) * w);
                 let center = (corners[0] + corners[1] + corners[2]) / 3.0;
                 let reach = corners.iter().map(|corner| corner.distance(center)).fold(0.0, f32::max);
-                pieces.push(TissuePiece { center, reach, measure, side, id: [triangle as u32, part] });
+                pieces.push(TissuePiece { center, reach, measure, side, id: [face, part] });
             }
         }
         true
