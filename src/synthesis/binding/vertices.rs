@@ -8,6 +8,9 @@ use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
 use crate::synthesis::{pace::Pace, parallel};
 use bevy_math::{Vec3, Vec3A};
 
+/// Share of the summed areas below which the sum of their normals is rounding.
+const CANCELLED_SHARE: f64 = 1.0e-5;
+
 /// Fewest triangles, vertices, or groups of four nodes, worth handing to another thread.
 pub(super) const WORTH_SHARING: usize = 2048;
 
@@ -79,7 +82,10 @@ impl Vertices {
         let normal = |_, &[from, to]: &[u32; 2]| {
             let areas = around[from as usize..to as usize].iter().map(|&triangle| areas[triangle as usize]);
             // In f64, where no square of an area vanishes.
-            Vec3A::from(unit(areas.sum::<Vec3A>().as_dvec3()))
+            let sum = areas.clone().sum::<Vec3A>().as_dvec3();
+            let weight: f64 = areas.map(|area| area.as_dvec3().length()).sum();
+            // What is left where areas cancel out is rounding.
+            if sum.length() > CANCELLED_SHARE * weight { Vec3A::from(unit(sum)) } else { Vec3A::ZERO }
         };
         parallel::map_all(&self.ranges, &mut self.normals, WORTH_SHARING, normal);
         let (welding, normals) = (&self.welding, &self.normals);

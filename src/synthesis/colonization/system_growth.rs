@@ -320,7 +320,8 @@ impl SystemGrowth {
         forest.sum_up(|node| drains.wake(node, false));
         news.spread(drains, first_new, &forest.tree.positions()[first_new as usize..], lengths.reach());
         for heard in news.iter() {
-            drains.hear(heard, |drain| forest.cos_to(heard.node, drain));
+            let is_open = perception::is_open(forest, lengths, heard.node);
+            drains.hear(heard, |drain| forest.cos_to(heard.node, drain).filter(|_| is_open));
         }
     }
 

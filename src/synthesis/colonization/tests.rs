@@ -116,7 +116,9 @@ fn pulled_by(drains: &[Vec3], change: impl Fn(&mut ColonizationSettings)) -> Col
         ColonizationSettings { samples: 0, steps: 40, confine: false, ..ColonizationSettings::default() };
     change(&mut settings);
     let mut growth = growth(settings);
-    drains.iter().for_each(|&drain| _ = growth.systems[0].drains.add(drains::Attraction { position: drain, side: Vec3::ZERO }));
+    drains
+        .iter()
+        .for_each(|&drain| _ = growth.systems[0].drains.add(drains::Attraction { position: drain, side: Vec3::ZERO }));
     while !growth.is_finished() {
         growth.step();
         assert_sound(&growth);

@@ -8,7 +8,11 @@ use crate::synthesis::{
     },
     pace::{Pace, at_once},
     random::{VesselRng, alias_table::AliasTable, many},
-    tissue::{Extent, Facet, Tissue, TissuePiece, TissuePoint, error::{TissueError, rounding_within}, pieces},
+    tissue::{
+        Extent, Facet, Tissue, TissuePiece, TissuePoint,
+        error::{TissueError, rounding_within},
+        pieces,
+    },
 };
 use bevy_math::{DVec3, Vec3, bounding::Aabb3d};
 use rand::RngExt;
