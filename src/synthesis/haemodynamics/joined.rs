@@ -24,6 +24,7 @@ use super::{
 use crate::synthesis::{
     pace::{Pace, at_once},
     tree::BedLink,
+    units::Resistance,
 };
 
 /// Arteries and veins of an organ, joined through the bed.
@@ -100,6 +101,21 @@ impl Circulation {
         self.venous.set_links(links.iter().map(|link| link.venous), &pace.part(0.5..1.0)).await;
         self.links = links.len();
         Ok(())
+    }
+
+    /// Resistance of each link, and of the bed behind each terminal without one.
+    pub fn bed_resistance(&self) -> Resistance {
+        Resistance::from_pascal_seconds_per_cubic_metre(1.0 / self.conductance)
+    }
+
+    /// Replaces it, and solves.
+    pub(super) fn set_bed_resistance(&mut self, resistance: Resistance) -> Result<(), FlowError> {
+        self.conductance = 1.0 / resistance.pascal_seconds_per_cubic_metre();
+        for network in [&mut self.arterial, &mut self.venous] {
+            network.settings.bed.resistance = Some(resistance);
+            at_once(network.set_beds(&Pace::default()));
+        }
+        self.solve()
     }
 
     /// The arteries.
