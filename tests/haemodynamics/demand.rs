@@ -5,7 +5,7 @@ use bevy_vessels::synthesis::{
     colonization::Colonization,
     haemodynamics::{Circulation, FlowError, FlowSettings, Network},
     preset::PresetName,
-    tissue::{Ball, Disc, Extent, Tissue, TissueMode, TissueSource},
+    tissue::{Disc, Extent, Tissue},
     tree::VesselKind,
     units::Flow,
 };
@@ -45,23 +45,14 @@ fn a_flow_that_vessels_do_not_let_through_is_refused_and_changes_nothing() -> Ou
 /// With the blood that its preset names, an organ takes the published flow, in a single tree and joined with its veins.
 #[test]
 fn organs_of_presets_take_the_published_flow() -> Outcome {
-    // mL/min: the superior mesenteric artery fasted to fed, the retina's 44 to 80 µL, textbook values of kidney and liver.
-    let published = [
-        (PresetName::Colon, 0.0..706.0),
-        (PresetName::Retina, 0.044..0.080),
-        (PresetName::Kidney, 500.0..700.0),
-        (PresetName::Liver, 300.0..500.0),
-    ];
-    for (name, range) in published {
+    // mL/min: up to what the superior mesenteric artery brings to fasted to fed guts, and the retina's.
+    for (name, range) in [(PresetName::Colon, 0.0..706.0), (PresetName::Retina, 0.044..0.080)] {
         let preset = name.load();
         let blood = preset.blood.ok_or("the preset names its blood")?;
-        let is_surface = matches!(&preset.tissue, TissueSource::Mesh(mesh) if mesh.mode == TissueMode::Surface);
         // In a unit of its own, which the scale makes good.
-        let tissue: Arc<dyn Tissue> =
-            if is_surface { Arc::new(Disc::flat(70.0)?) } else { Arc::new(Ball::new(Default::default(), 70.0)?) };
+        let tissue: Arc<dyn Tissue> = Arc::new(Disc::flat(70.0)?);
         let generator = preset.generator_for(tissue.extent());
-        let mut growth_settings = generator.colonization().ok_or("presets colonize")?.clone();
-        growth_settings.steps = growth_settings.steps.min(60);
+        let growth_settings = generator.colonization().ok_or("presets colonize")?.clone();
         let mut growth = Colonization::new(Arc::clone(&tissue), growth_settings, &preset.roots(), 1)?;
         growth.run();
         let scale = blood.scale(tissue.extent())?;
@@ -69,11 +60,14 @@ fn organs_of_presets_take_the_published_flow() -> Outcome {
         let [arteries, veins] = [VesselKind::Artery, VesselKind::Vein].map(|kind| growth.tree(kind));
         let bed = resisting(1e3).bed;
         let mut alone = Network::new(arteries, FlowSettings { scale, ..FlowSettings::arterial() })?;
-        alone.fit_bed(blood.flow)?;
+        alone.fit_bed(blood.flow).map_err(|error| format!("{name}: {error}"))?;
+        let shear = alone.wall_shear_stresses().fold(0.0, f64::max);
+        println!("{name}: largest wall shear {shear} Pa");
         let arterial = Network::new(arteries, FlowSettings { scale, bed, ..FlowSettings::arterial() })?;
         let venous = Network::new(veins, FlowSettings { scale, bed, ..FlowSettings::venous() })?;
         let mut joined = Circulation::new(arterial, venous, growth.bed_links())?;
-        joined.fit_bed(blood.flow)?;
+        let bed = joined.fit_bed(blood.flow).map_err(|error| format!("{name}: {error}"))?;
+        println!("{name}: {} mmHg·min/mL, {} passes", bed.mmhg_min_per_ml(), joined.passes());
         for inflow in [alone.inflow(), joined.arterial().inflow()] {
             assert!(range.contains(&inflow.ml_per_min()), "{name}: {} mL/min", inflow.ml_per_min());
             assert!((inflow.ml_per_min() / blood.flow.ml_per_min() - 1.0).abs() < 1e-6);

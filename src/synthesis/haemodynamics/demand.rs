@@ -11,10 +11,12 @@ use crate::synthesis::{
     units::{Flow, Resistance},
 };
 
-/// Factor between two resistances that are tried while none is too low, or too high.
-const STRIDE: f64 = 16.0;
-/// Such strides from the first guess, up or down, after which the flow counts as out of reach.
-const STRIDES: u32 = 12;
+/// Terminals of an organ with which the search for a resistance begins.
+const MOST_TERMINALS: f64 = 1e7;
+/// Factor between two resistances that are tried while the flow is too low.
+const STRIDE: f64 = 4.0;
+/// Such strides after which the flow counts as out of reach.
+const STRIDES: u32 = 32;
 /// Largest error of the resistance, as a share.
 const ACCURACY: f64 = 1e-9;
 
@@ -73,19 +75,19 @@ fn fit(
         let resistance = Resistance::from_pascal_seconds_per_cubic_metre(resistance);
         inflow(resistance).map(Flow::cubic_metres_per_second)
     };
-    // That of a bed of one terminal, if the vessels had none.
-    let guess = (drop.abs() / wanted).max(f64::MIN_POSITIVE);
-    let (mut low, mut high) = (guess, guess);
-    let mut most = at(guess)?;
-    let falls_short = most < wanted;
+    // From above, since joined trees are harder to solve the less the bed resists. The first is far more than a bed of a
+    // million terminals needs.
+    let mut high = MOST_TERMINALS * (drop.abs() / wanted).max(f64::MIN_POSITIVE);
+    let mut low = high;
+    let mut most = at(low)?;
     for _ in 0..STRIDES {
-        if (most < wanted) != falls_short {
+        if most >= wanted {
             break;
         }
-        (low, high) = if falls_short { (low / STRIDE, low) } else { (high, high * STRIDE) };
-        most = at(if falls_short { low } else { high })?;
+        (low, high) = (low / STRIDE, low);
+        most = at(low)?;
     }
-    if (most < wanted) == falls_short {
+    if !(most >= wanted) {
         let most = Flow::from_cubic_metres_per_second(most).ml_per_min();
         return Err(FlowError::OutOfReach { flow: flow.ml_per_min(), nearest: most });
     }

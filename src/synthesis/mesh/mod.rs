@@ -11,6 +11,7 @@ pub(crate) mod disjoint_sets;
 pub(crate) mod facing;
 mod indexed;
 pub mod intersections;
+mod neighbours;
 mod separation;
 mod shaded;
 #[cfg(test)]

@@ -5,16 +5,15 @@ use super::{
     triangle_mesh::{doubled_normal, is_degenerate},
 };
 use crate::synthesis::pace::{Pace, Stretch, at_once};
-use bevy_math::{DVec3, Vec3};
-use std::{collections::VecDeque, num::NonZeroU32};
+use std::collections::VecDeque;
 
 /// An edge between two welded vertices, in one of its triangles. Their order puts uses of the same edge side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct EdgeUse {
+pub(super) struct EdgeUse {
     /// The lower vertex in the upper half, the higher in the lower half.
-    key: u64,
+    pub key: u64,
     /// The triangle.
-    triangle: u32,
+    pub triangle: u32,
     /// Whether the triangle runs from the lower vertex to the higher.
     forward: bool,
 }
@@ -24,7 +23,7 @@ struct EdgeUse {
 pub struct MeshTopology {
     welding: Welding,
     /// Corners as welded vertices; `None` for a degenerate triangle.
-    triangles: Vec<Option<[u32; 3]>>,
+    pub(super) triangles: Vec<Option<[u32; 3]>>,
     /// Every use of every edge, sorted by edge.
     edges: Vec<EdgeUse>,
 }
@@ -214,39 +213,8 @@ impl MeshTopology {
         (patches, closed)
     }
 
-    /// What lies across each side of each triangle. Side k runs from corner k to the next.
-    ///
-    /// Of several triangles at a common edge, it is the one that continues a triangle most straightly.
-    pub(crate) async fn neighbours(&self, mesh: &TriangleMesh, pace: &Pace) -> Vec<[Option<Across>; 3]> {
-        let mut neighbours = vec![[None; 3]; self.triangles.len()];
-        let (mut stretch, mut done) = (Stretch::default(), 0);
-        for fan in self.fans() {
-            let sides = || fan.iter().filter_map(|edge| Some((edge.triangle, self.side_at(edge)?)));
-            for (triangle, side) in sides() {
-                let inward = inward(mesh.corners(triangle as usize), side);
-                let turn = |&(other, side): &(u32, usize)| {
-                    if fan.len() == 2 { 0.0 } else { inward.dot(self::inward(mesh.corners(other as usize), side)) }
-                };
-                let straightest = sides().filter(|&(other, _)| other != triangle);
-                let straightest = straightest.min_by(|a, b| turn(a).total_cmp(&turn(b)));
-                neighbours[triangle as usize][side] = straightest.map(|(triangle, side)| Across::new(triangle, side));
-            }
-            done += fan.len();
-            if stretch.ends_after(fan.len()) {
-                pace.rest(done as f32 / self.edges.len() as f32).await;
-            }
-        }
-        neighbours
-    }
-
-    /// The side of a triangle that uses an edge.
-    fn side_at(&self, edge: &EdgeUse) -> Option<usize> {
-        let corners = self.triangles[edge.triangle as usize]?;
-        (0..3).find(|&side| edge_key(corners[side], corners[(side + 1) % 3]) == edge.key)
-    }
-
     /// The uses of each edge.
-    fn fans(&self) -> impl Iterator<Item = &[EdgeUse]> {
+    pub(super) fn fans(&self) -> impl Iterator<Item = &[EdgeUse]> {
         self.edges.chunk_by(|a, b| a.key == b.key)
     }
 
@@ -320,33 +288,8 @@ impl MeshTopology {
 }
 
 /// Both ends of an edge, the lower vertex first.
-fn edge_key(from: u32, to: u32) -> u64 {
+pub(super) fn edge_key(from: u32, to: u32) -> u64 {
     u64::from(from.min(to)) << 32 | u64::from(from.max(to))
-}
-
-/// A triangle, and the side on which it is entered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Across(NonZeroU32);
-
-impl Across {
-    fn new(triangle: u32, side: usize) -> Self {
-        // There are at most 2²⁶ triangles.
-        Self(NonZeroU32::MIN.saturating_add(triangle << 2 | side as u32))
-    }
-
-    pub fn triangle(self) -> u32 {
-        (self.0.get() - 1) >> 2
-    }
-
-    pub fn side(self) -> usize {
-        ((self.0.get() - 1) & 3) as usize
-    }
-}
-
-/// Unit vector in a triangle's plane, perpendicular to one of its sides, to the inside.
-pub(crate) fn inward(corners: [Vec3; 3], side: usize) -> DVec3 {
-    let along = corners[(side + 1) % 3].as_dvec3() - corners[side].as_dvec3();
-    doubled_normal(corners).cross(along).normalize_or_zero()
 }
 
 /// Parts of a surface.
@@ -361,6 +304,7 @@ pub(crate) struct Patches {
 mod tests {
     use super::*;
     use crate::synthesis::mesh::MeshError;
+    use bevy_math::Vec3;
 
     /// A tetrahedron in which every triangle has vertices of its own.
     fn soup() -> Result<TriangleMesh, MeshError> {

@@ -7,7 +7,7 @@
 
 use super::{
     MeshTopology, TriangleIndex, TriangleMesh, doubled_normal,
-    topology::{Across, inward},
+    neighbours::{Across, inward},
 };
 use crate::synthesis::pace::Pace;
 use bevy_math::{DVec3, Vec3};
