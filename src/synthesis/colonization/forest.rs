@@ -57,6 +57,11 @@ fn cos_at(direction: Vec3, node: Vec3, drain: Vec3) -> f32 {
 /// Cosine of the angle between two facets from which each lies on the other side of a wall.
 const AVERTED: f32 = -0.5;
 
+/// Cosine of the angle between two facets from which one lies round an edge from the other.
+const ROUND: f32 = 0.5;
+/// Share of the squared way to a point from which it counts as off a facet: a little more than that of a ball.
+const RAISED: f32 = 0.02;
+
 /// Share of the squared way to a drain that must be along a facet.
 const STEEP: f32 = 1e-6;
 
@@ -180,13 +185,19 @@ impl Forest {
         self.facets[node as usize].is_none_or(|facet| facet.normal.dot(side) > AVERTED)
     }
 
-    /// Whether a point lies rather above or below a node's facet than beside the node, so that it may be on the other side
-    /// of a wall.
+    /// Whether a node supplies a side of the tissue's surface near it: not round a sharp edge, so that vessels are drawn
+    /// round it, and not through a wall.
+    pub fn supplies(&self, node: u32, side: Vec3) -> bool {
+        self.facets[node as usize].is_none_or(|facet| facet.normal.dot(side) > ROUND)
+    }
+
+    /// Whether a point lies so far above or below a node's facet that it may be round an edge, or on the other side of a
+    /// wall.
     pub fn is_steep(&self, node: u32, point: Vec3) -> bool {
         let way = point - self.tree.positions()[node as usize];
         self.facets[node as usize].is_some_and(|facet| {
             let height = way.dot(facet.normal);
-            2.0 * height * height > way.length_squared()
+            height * height > RAISED * way.length_squared()
         })
     }
 

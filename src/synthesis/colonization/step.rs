@@ -30,7 +30,7 @@ impl<'a> Step<'a> {
         // A staged tissue changes from stage to stage, and has no pieces of its own.
         if self.tissue.stage(1).is_none() {
             let (forest, drains) = (&arteries.forest, arteries.drains.living());
-            let nodes = (forest.tree.positions(), |node, side| forest.sees(node, side));
+            let nodes = (forest.tree.positions(), |node, side| forest.supplies(node, side));
             vacancy.prepare(self.tissue, arteries.length_scale(), nodes, drains);
         }
         self.draw(draws, vacancy.chosen());

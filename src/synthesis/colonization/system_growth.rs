@@ -203,7 +203,7 @@ impl SystemGrowth {
         // A search for the side of the place is seldom needed.
         beside || {
             let (side, mut seen) = (ground.side(place), false);
-            forest.index().for_each_within(place, reach, |node, _| seen |= forest.sees(node, side));
+            forest.index().for_each_within(place, reach, |node, _| seen |= forest.supplies(node, side));
             seen
         }
     }

@@ -85,13 +85,13 @@ impl Vacancy {
         self.pieces.clear();
     }
 
-    /// Prepares for the candidates of a step, given λ and all blockers: nodes, with whether one sees a side of a surface,
+    /// Prepares for the candidates of a step, given λ and all blockers: nodes, with whether one supplies a side of a surface,
     /// and drains. Does nothing for tissues that cannot be cut.
     pub fn prepare(
         &mut self,
         tissue: &dyn Tissue,
         scale: f32,
-        (nodes, sees): (&[Vec3], impl Fn(u32, Vec3) -> bool),
+        (nodes, supplies): (&[Vec3], impl Fn(u32, Vec3) -> bool),
         drains: impl Iterator<Item = (u32, Vec3)>,
     ) {
         if scale > self.cut_at || scale < self.cut_at * COARSE {
@@ -106,7 +106,7 @@ impl Vacancy {
             return;
         }
         for (node, &position) in nodes.iter().enumerate().skip(self.covered) {
-            self.add_node(position, |side| sees(node as u32, side));
+            self.add_node(position, |side| supplies(node as u32, side));
         }
         self.covered = nodes.len();
         if self.free_measure < ENOUGH * self.listed_measure {
@@ -154,13 +154,13 @@ impl Vacancy {
         }
     }
 
-    fn add_node(&mut self, position: Vec3, sees: impl Fn(Vec3) -> bool) {
+    fn add_node(&mut self, position: Vec3, supplies: impl Fn(Vec3) -> bool) {
         let Self { pieces, index, blocked, until, radii, free_measure, .. } = self;
         let inverse = radii[0].recip();
         index.for_each_within(position, radii[0] * *until, |piece, distance| {
             let (piece, blocked) = (&pieces[piece as usize], &mut blocked[piece as usize]);
             let threshold = (distance.sqrt() + piece.reach) * inverse;
-            if threshold <= *until && threshold < blocked.by_nodes && sees(piece.side) {
+            if threshold <= *until && threshold < blocked.by_nodes && supplies(piece.side) {
                 if blocked.by_nodes > *until {
                     *free_measure -= f64::from(piece.measure);
                 }
