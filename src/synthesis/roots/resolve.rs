@@ -46,7 +46,7 @@ impl Roots {
                 RootPlacement::Spread(count) => spread(tissue, kind, *count, &mut rng)?,
                 RootPlacement::Within(reach) => {
                     check_reach(kind, *reach)?;
-                    within(tissue, kind, reach * diameter, &mut rng)?
+                    within(tissue, kind, reach * diameter, own.reach, &mut rng)?
                 }
                 RootPlacement::Beside => {
                     let others = self.neighbours(tissue, kind.companion(), &roots);

@@ -38,7 +38,7 @@ const TRIES: u32 = 8;
 /// One sample in this many may stay out of reach, in corners and bits of tissue too small for a root.
 const SPARED: usize = 200;
 
-/// Finds roots such that all tissue is within `way` of one, along the tissue.
+/// Finds roots such that all tissue is within `way` of one, along the tissue. Vessels perceive tissue within `reach`.
 ///
 /// The seed's first sample is the root if it reaches everything, else the first sample that does. If none does, the
 /// first stays, and the sample furthest from all roots is added repeatedly, until all are near enough.
@@ -46,6 +46,7 @@ pub(super) fn within(
     tissue: &dyn Tissue,
     kind: VesselKind,
     way: f32,
+    reach: f32,
     rng: &mut VesselRng,
 ) -> Result<Vec<TissuePoint>, RootError> {
     let samples = draw(tissue, SPREAD_SAMPLES, rng);
@@ -58,7 +59,7 @@ pub(super) fn within(
         return Ok(vec![place(&samples[0])]);
     }
     let places: Vec<TissuePoint> = samples.iter().map(place).collect();
-    Ok(Web::over(tissue, &places).centers(way).into_iter().map(|center| places[center as usize]).collect())
+    Ok(Web::over(tissue, &places, reach).centers(way).into_iter().map(|center| places[center as usize]).collect())
 }
 
 /// Samples, joined to their nearest neighbours.
@@ -68,7 +69,7 @@ struct Web {
 }
 
 impl Web {
-    fn over(tissue: &dyn Tissue, samples: &[TissuePoint]) -> Self {
+    fn over(tissue: &dyn Tissue, samples: &[TissuePoint], reach: f32) -> Self {
         let mut links = vec![Vec::new(); samples.len()];
         for (a, b) in nearest_pairs(samples) {
             let ends = [samples[a as usize], samples[b as usize]];
@@ -80,7 +81,27 @@ impl Web {
                 links[b as usize].push((a, length));
             }
         }
-        Self { links }
+        let mut web = Self { links };
+        web.part_at_rims(samples, reach);
+        web
+    }
+
+    /// Joins each sample on the rim of a wall to one side of it only. Vessels on one side supply much of the rim of a wall
+    /// that is thinner than `reach`, and then little draws them round it.
+    fn part_at_rims(&mut self, samples: &[TissuePoint], reach: f32) {
+        let normal = |sample: u32| samples[sample as usize].normal;
+        for rim in 0..samples.len() {
+            let distance = |other: u32| samples[rim].position.distance(samples[other as usize].position);
+            let mut near: Vec<u32> = self.links[rim].iter().map(|&(other, _)| other).collect();
+            near.retain(|&other| distance(other) < reach);
+            near.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+            let Some(&side) = near.first() else { continue };
+            near.retain(|&other| normal(side).dot(normal(other)) < -FACING);
+            for other in near {
+                self.links[rim].retain(|&(linked, _)| linked != other);
+                self.links[other as usize].retain(|&(linked, _)| linked != rim as u32);
+            }
+        }
     }
 
     fn centers(&self, way: f32) -> Vec<u32> {
