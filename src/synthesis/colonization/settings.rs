@@ -213,8 +213,10 @@ pub struct ColonizationSettings {
     pub arterial: SystemSettings,
     /// Settings of the veins.
     pub venous: SystemSettings,
-    /// Whether a node that leaves the tissue is brought back to the tissue's nearest point: onto a surface, or into a
-    /// volume. The paper's own vessels leave it.
+    /// Whether vessels keep to the tissue. On a mesh's surface they run straight along it and bend where it does, with a
+    /// node at each bend, so that no segment leads more than half a terminal radius away from it (but at least 1/256 and at
+    /// most 1/16 of a step); they are drawn to tissue on their own side of it, in the directions along it. In other
+    /// tissues, a node that leaves the tissue is brought back to its nearest point. The paper's own vessels leave it.
     ///
     /// Default: true.
     pub confine: bool,

@@ -74,9 +74,10 @@ impl Web {
         for (a, b) in nearest_pairs(samples) {
             let ends = [samples[a as usize], samples[b as usize]];
             if leads_through(tissue, ends) {
-                // A vessel keeps its direction for a while, so bends of the surface slow it down.
+                // A vessel keeps its direction for a while, so bends of the surface slow it down. Twice the bend is what the
+                // folds of real organs ask for, so that each of their parts is supplied.
                 let bend = ends[0].normal.distance(ends[1].normal);
-                let length = ends[0].position.distance(ends[1].position) * (1.0 + bend);
+                let length = ends[0].position.distance(ends[1].position) * (1.0 + 2.0 * bend);
                 links[a as usize].push((b, length));
                 links[b as usize].push((a, length));
             }
