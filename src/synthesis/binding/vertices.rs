@@ -133,6 +133,20 @@ mod tests {
         }
     }
 
+    /// Sums of opposite areas are rounding, which is no direction.
+    #[test]
+    fn both_sides_of_a_sheet_leave_no_normal() {
+        let at = |k: u32| Vec3::new((k % 7) as f32 * 0.37, (k / 7) as f32 * 0.23, ((k * k) as f32 * 0.7).sin() * 0.1);
+        let positions: Vec<Vec3> = (0..49).map(at).collect();
+        let front = (0..36).map(|k| k + k / 6).flat_map(|k| [[k, k + 1, k + 7], [k + 1, k + 8, k + 7]]);
+        let triangles: Vec<[u32; 3]> = front.flat_map(|[a, b, c]| [[a, b, c], [c, b, a]]).collect();
+        let mesh = TriangleMesh::new(positions, triangles, None).expect("a mesh");
+        let mut vertices = Vec::new();
+        at_once(Vertices::new(&mesh, &Pace::default())).measure(mesh.positions(), &mut vertices);
+        assert!(vertices.iter().all(|vertex| vertex.normal == Vec3A::ZERO));
+        assert!(mesh.vertex_normals().iter().all(|normal| *normal == Vec3::ZERO));
+    }
+
     #[test]
     fn any_finite_coordinate_is_brought_near_one() {
         for largest in [0.0, f32::from_bits(1), f32::MIN_POSITIVE, 0.7, 1.0, 3.9, 1.0e9, f32::MAX] {

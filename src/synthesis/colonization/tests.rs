@@ -266,3 +266,20 @@ fn blood_comes_over_where_both_systems_supplied_a_drain() {
     growth.restart(ColonizationSettings { steps: 1, ..Default::default() }, &roots(), 1).expect("valid settings");
     assert!(growth.bed_links().is_empty());
 }
+
+#[test]
+fn lengths_and_given_radii_whose_powers_overflow_are_refused() {
+    let mut settings = ColonizationSettings::default();
+    settings.arterial.terminal_radius = 1e38;
+    let error = Colonization::new(disc(), settings, &roots(), 3).expect_err("a radius beyond all limits");
+    assert!(error.to_string().contains("terminal_radius"), "{error}");
+    for radius in [1e30, 1e-30] {
+        let mut given = VesselTree::new();
+        given.push_root(Vec3::new(-0.4, 0.0, 0.0), radius);
+        let mut roots = no_arteries();
+        roots.given.artery = Some(given);
+        let error =
+            Colonization::new(disc(), ColonizationSettings::default(), &roots, 3).expect_err("a radius of any size");
+        assert!(matches!(error, ColonizationError::GivenRadius { node: 0, .. }), "{error}");
+    }
+}
