@@ -28,9 +28,9 @@ use bevy::{
 /// [blood](crate::synthesis::preset::Preset::blood) gives the scale and the flow, and
 /// [`fit_bed`](crate::synthesis::haemodynamics::Network::fit_bed) the resistance for it.
 ///
-/// Time is that of Bevy's generic clock. Its virtual time counts at most
-/// [`max_delta`](bevy::time::Time::<bevy::time::Virtual>::max_delta) of a frame, a quarter of a second unless an app sets
-/// another: in longer frames blood loses time, as all that follows this clock does.
+/// Time is that of Bevy's generic clock. Its virtual time counts at most a quarter of a second of a frame, unless an app
+/// sets another `max_delta` of [`Time<Virtual>`](bevy::time::Virtual): in longer frames blood loses time, as all does that
+/// follows this clock.
 ///
 /// ```
 /// # use bevy_vessels::{plugin::{Perfusion, Vasculature}, synthesis::{preset::PresetName, units::Scale}};
