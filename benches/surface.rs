@@ -1,11 +1,12 @@
 //! The speed of closed meshes: of the networks on which other programs were measured, of networks of 10,000 to a million
-//! nodes, and of their check for faces that meet.
+//! nodes, of their check for faces that meet, and of meshes that follow their moved nodes.
 //!
 //! `cargo bench --bench surface` runs everything but the million; a part of a name after `--` selects benchmarks, such
 //! as `cargo bench --bench surface -- reference`. Times on a shared machine vary: compare only lines of one run.
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
+    binding::Skin,
     colonization::{Colonization, ColonizationSettings},
     preset::PresetName,
     roots::RootPlacement,
@@ -76,5 +77,20 @@ fn check(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, reference, scale, check);
+/// A surface that follows its moved nodes, on one thread: 100,000 vertices should take far less than a frame.
+fn follow(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("follow");
+    let tree = disc();
+    let settings = SurfaceSettings { level: 2, ..SurfaceSettings::default() };
+    let mesh = Surface::new(&tree, &settings).expect("a surface").mesh;
+    let mut skin = Skin::new(&mesh, &tree).expect("its own");
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("threads");
+    group.throughput(Throughput::Elements(mesh.positions.len() as u64));
+    group.bench_function("disc, arteries", |bencher| {
+        threads.install(|| bencher.iter(|| skin.follow(black_box(tree.positions())).map(<[_]>::len)));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, reference, scale, check, follow);
 criterion_main!(benches);

@@ -11,12 +11,31 @@
 mod command;
 
 use clap::Parser;
-use std::process::ExitCode;
+use std::process::{ExitCode, exit};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether the user has asked to stop.
+static STOP: AtomicBool = AtomicBool::new(false);
 
 fn main() -> ExitCode {
     let options = command::Options::parse();
-    match command::run(&options, &mut std::io::stdout().lock()) {
-        Ok(()) => ExitCode::SUCCESS,
+    // Asked once, the command ends cleanly; asked again, at once.
+    let stop = || {
+        if STOP.swap(true, Ordering::Relaxed) {
+            exit(130);
+        }
+    };
+    if let Err(error) = ctrlc::set_handler(stop) {
+        eprintln!("generate: warning: an interruption will leave temporary files: {error}");
+    }
+    match command::run(&options, &mut std::io::stdout().lock(), &STOP) {
+        Ok(summary) => {
+            // Beside the lines for scripts, not among them.
+            if options.count > 1 {
+                eprint!("{summary}");
+            }
+            ExitCode::SUCCESS
+        }
         Err(failure) => {
             eprintln!("generate: {failure}");
             ExitCode::from(failure.exit_code())

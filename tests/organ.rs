@@ -2,10 +2,15 @@
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    mesh::ShadedMesh,
+    mesh::{ShadedMesh, TriangleMesh},
     organ::{Colon, ColonSettings, LiverSettings},
+    preset::PresetName,
+    random::Stream,
+    roots::{RootPlacement, RootPlacements},
+    tissue::{MeshSurface, Tissue},
+    tree::{VesselKind, statistics},
 };
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 const SEEDS: std::ops::Range<u64> = 0..12;
 
@@ -188,6 +193,9 @@ fn the_wall_keeps_its_thickness_and_the_lumen_is_open() {
             assert!(distance < room, "colon {seed}: the lumen reaches beyond the wall at point {index}");
         }
         assert!(nearest(&colon, colon.lumen.eye).1 < 0.01, "the endoscope is in the lumen");
+        let wall = colon.mesh.positions.iter().map(|point| point.distance(colon.lumen.eye));
+        let gap = wall.fold(f32::INFINITY, f32::min);
+        assert!(gap > 0.008, "colon {seed}: the endoscope begins {gap} m from the wall");
         let end = colon.centre_line[last];
         assert!((colon.rim.eye - end).dot(end - colon.rim.target) > 0.0, "the rim is seen from outside");
     }
@@ -203,6 +211,38 @@ fn roots_lie_on_their_side_of_the_wall() {
             let gap = part.positions.iter().map(|point| point.distance(*artery)).fold(f32::INFINITY, f32::min);
             assert!(gap < 0.006, "a root is {gap} m from the wall");
             assert!((0.001..=0.02).contains(&artery.distance(*vein)), "artery and vein belong together");
+        }
+    }
+}
+
+/// The appendix is too thin for vessels of the caecum to find their way along it.
+#[test]
+fn vessels_supply_the_appendix() {
+    for seed in 0..3 {
+        let colon = ColonSettings { seed, triangles: 40_000, ..Default::default() }.generate().expect("a colon");
+        let outer = colon.mesh.part(colon.outer.clone());
+        let mesh = TriangleMesh::new(outer.positions, outer.triangles, None).expect("a mesh");
+        let tissue = Arc::new(MeshSurface::new(mesh).expect("a surface"));
+        let preset = PresetName::Colon.load();
+        let placed = RootPlacements {
+            artery: RootPlacement::Nearest(colon.roots.arterial.clone()),
+            vein: RootPlacement::Nearest(colon.roots.venous.clone()),
+            ..RootPlacements::default()
+        };
+        let generator = preset.generator_for(tissue.extent());
+        let mut growth = generator.start(Arc::clone(&tissue) as _, &placed.into(), seed).expect("a growth");
+        growth.run();
+        // Up to where it widens to the caecum.
+        let end = colon.radii.iter().position(|&radius| radius > 0.006).expect("a caecum");
+        let is_near = |point: &Vec3| colon.centre_line[..end].iter().any(|at| at.distance(*point) < 0.006);
+        let mut rng = Stream::Statistics.rng(1);
+        let samples: Vec<Vec3> =
+            (0..200_000).filter_map(|_| tissue.sample(&mut rng)).filter(|point| is_near(point)).collect();
+        assert!(samples.len() > 500, "{} samples", samples.len());
+        for (kind, least) in [(VesselKind::Artery, 0.9), (VesselKind::Vein, 0.8)] {
+            let grown = growth.trees()[kind].expect("a tree");
+            let share = statistics::coverage(grown.tree, &samples, 2.0 * grown.reach).expect("samples");
+            assert!(share > least, "colon {seed}: {} vessels supply {share} of the appendix", kind.name());
         }
     }
 }

@@ -4,18 +4,20 @@
 
 #![cfg(all(feature = "mesh_files", feature = "serialize"))]
 
+#[path = "common/shared.rs"]
+mod shared;
+
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::Colonization,
-    io::load_mesh,
+    io::{SwcReadOptions, load_mesh, load_swc},
     preset::PresetName,
     random::Stream,
     tissue::{SourceData, Tissue, TissueMode},
     tree::{VesselKind, statistics},
 };
-use std::{path::Path, sync::Arc};
+use std::sync::Arc;
 
-const ORGANS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs");
 const SEEDS: u64 = 3;
 const SAMPLES: usize = 20_000;
 /// Octants with fewer samples are ignored.
@@ -46,11 +48,7 @@ fn worst(growth: &Colonization, octants: &[Vec<Vec3>], kind: VesselKind) -> f32 
 /// Grows organs with several seeds. In the worst octant arteries and veins must supply at least these shares.
 fn check(organs: &[&str], preset: PresetName, mode: TissueMode, least: [f32; 2]) {
     for name in organs {
-        let path = Path::new(ORGANS).join(format!("{name}.glb"));
-        if !path.exists() {
-            eprintln!("skipped: there is no {}", path.display());
-            continue;
-        }
+        let Some(path) = shared::folder(&format!("data/organs/{name}.glb")) else { continue };
         let mesh = load_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
         let mut preset = preset.load();
         preset.tissue = mode.into();
@@ -83,6 +81,31 @@ fn the_colon_preset_supplies_guts() {
 #[test]
 fn the_kidney_preset_supplies_the_kidney() {
     check(&["kidney_left_vhf"], PresetName::Kidney, TissueMode::Volume, [0.85, 0.75]);
+}
+
+/// The trunk enters the kidney where the same body's renal artery does: within a fifth of the kidney's length, since the
+/// artery's segments end in the sinus.
+#[test]
+fn the_kidneys_trunk_enters_at_the_hilum() {
+    let Some(kidney) = shared::folder("data/organs/kidney_left_vhf.glb") else { return };
+    let Some(artery) = shared::folder("data/vessels/kidney_left_renal_artery_vhf.swc") else { return };
+    let real = load_swc(artery, &SwcReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let mesh = Arc::new(load_mesh(&kidney).unwrap_or_else(|error| panic!("{error}")));
+    for mode in [TissueMode::Surface, TissueMode::Volume] {
+        let mut preset = PresetName::Kidney.load();
+        preset.tissue = mode.into();
+        let data = SourceData { mesh: Some(Arc::clone(&mesh)), ..SourceData::default() };
+        let prepared = preset.tissue.prepare(&data).unwrap_or_else(|error| panic!("{error}"));
+        let tissue = prepared.tissue();
+        let spacing = preset.generator_for(tissue.extent()).root_spacing();
+        for seed in 0..8 {
+            let roots = preset.roots().resolve(&**tissue, &spacing, seed).unwrap_or_else(|error| panic!("{error}"));
+            // The kidney is in metres, the artery in millimetres.
+            let root = 1e3 * roots.artery[0].position;
+            let away = real.positions().iter().map(|at| at.distance(root)).fold(f32::INFINITY, f32::min);
+            assert!(away < 26.0, "{mode:?}, seed {seed}: {root} is {away} mm from the renal artery");
+        }
+    }
 }
 
 #[test]

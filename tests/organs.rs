@@ -4,6 +4,9 @@
 
 #![cfg(feature = "mesh_files")]
 
+#[path = "common/shared.rs"]
+mod shared;
+
 use bevy_math::{DVec2, DVec3, Mat3, Vec3};
 use bevy_vessels::synthesis::{
     colonization::{Colonization, ColonizationSettings},
@@ -18,17 +21,12 @@ use std::{
     sync::Arc,
 };
 
-const ORGANS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs");
-
 /// Awkward files with an open surface, whose inside is not defined.
 const OPEN: [&str; 2] = ["colon_vhf_original", "pancreas_vhf_v2_original"];
 
 /// All organs in a folder, by name.
 fn files(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        eprintln!("skipped: there are no organs in {}", folder.display());
-        return Vec::new();
-    };
+    let entries = std::fs::read_dir(folder).expect("a readable folder");
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("a readable folder").path()).collect();
     paths.retain(|path| path.extension().is_some_and(|ending| ending == "glb"));
     paths.sort();
@@ -38,9 +36,8 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 
 /// All organs with their names: the good ones first, then the awkward ones.
 fn organs() -> impl Iterator<Item = (String, TriangleMesh)> {
-    let folder = Path::new(ORGANS);
-    let paths = files(folder).into_iter().chain(files(&folder.join("awkward")));
-    paths.map(|path| {
+    let folders = ["data/organs", "data/organs/awkward"].into_iter().filter_map(shared::folder);
+    folders.flat_map(|folder| files(&folder)).map(|path| {
         let name = path.file_stem().expect("a file name").to_string_lossy().into_owned();
         let mesh = load_mesh(&path).unwrap_or_else(|error| panic!("{error}"));
         (name, mesh)

@@ -2,6 +2,9 @@
 
 #![cfg(feature = "mesh_files")]
 
+#[path = "common/shared.rs"]
+mod shared;
+
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     io::load_mesh,
@@ -36,12 +39,7 @@ const AWKWARD: [&str; 3] =
     ["awkward/colon_vhf_original", "awkward/pancreas_vhf_v2_original", "awkward/spleen_vhf_original_uv"];
 
 fn folder() -> Option<PathBuf> {
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs"));
-    if !folder.is_dir() {
-        println!("skipped: no organs at {}", folder.display());
-        return None;
-    }
-    Some(folder.to_path_buf())
+    shared::folder("data/organs")
 }
 
 fn read(folder: &Path, name: &str) -> Result<TriangleMesh, Box<dyn std::error::Error>> {

@@ -2,25 +2,35 @@
 
 mod batch;
 mod edit;
+mod flow;
+mod identity;
 mod mesh;
 mod organ;
 mod report;
+mod summary;
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::ColonizationSettings,
     generator::Generator,
-    io::{MeshReadError, load_mesh},
+    io::{MeshReadError, ObjOptions, load_mesh, remove_stale},
+    mesh::TriangleMesh,
     preset::{Preset, PresetName},
     roots::RootPlacement,
     surface::SurfaceSettings,
     tissue::{MeshTissue, SourceData, Tissue, TissueMode, TissueShape, TissueSource},
+    units::Scale,
 };
-use clap::{Parser, ValueEnum};
+use clap::{Parser, ValueEnum, builder::TypedValueParser};
+use identity::Run;
+use std::fs::{self, Metadata};
 use std::io::Write;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+pub use summary::Summary;
 
 /// Grows arteries and veins in organs, without a window.
 #[derive(Debug, Parser)]
@@ -30,6 +40,10 @@ pub struct Options {
     /// OBJ).
     #[arg(long, default_value = "disc", value_name = "disc|ball|box|FILE")]
     pub tissue: PathBuf,
+    /// Unit of the tissue's lengths, noted in all files. SWC files are then in micrometres, as other programs expect;
+    /// all others stay in the tissue's lengths.
+    #[arg(long)]
+    pub unit: Option<Unit>,
     /// Where on an organ's mesh vessels grow: over its surface, through its volume, or both in stages. Default: the
     /// preset's.
     #[arg(long)]
@@ -47,7 +61,7 @@ pub struct Options {
     #[arg(long)]
     pub steps: Option<u32>,
     /// Samples drawn from the tissue in each step. Default: the preset's.
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     pub samples: Option<u32>,
     /// Multiplies every length of the settings, after fitting them to the tissue.
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
@@ -55,7 +69,8 @@ pub struct Options {
     /// Grows arteries only.
     #[arg(long)]
     pub no_veins: bool,
-    /// Number of threads. They share the organs; spare threads share the work on one organ. Default: all cores.
+    /// Number of threads, or fewer if the system allows no more. They share the organs; spare threads share the work on
+    /// one organ. Default: all cores.
     #[arg(long)]
     pub threads: Option<NonZeroUsize>,
     /// Seed of the first organ.
@@ -67,12 +82,23 @@ pub struct Options {
     /// Share of the organs to grow, I of N, counted from 0: those whose number modulo N is I.
     #[arg(long, value_name = "I/N", default_value = "0/1", value_parser = parse_shard)]
     pub shard: Shard,
-    /// Folder for the vessels, created if missing. Without it, nothing is written.
+    /// Folder for the vessels, created if missing. Without it, nothing is written. Other runs may have the same: names
+    /// begin with tissue, mode, preset and a hash of all that distinguishes a run, which stands in full in a .ron file.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Skips organs whose files are there, and reports them as they were.
+    #[arg(long, requires = "out")]
+    pub resume: bool,
     /// Formats to write.
     #[arg(long, value_delimiter = ',', default_value = "swc")]
     pub format: Vec<Format>,
+    /// Sides of the round cones in OBJ files, 3 to 64. Files are the larger the more there are.
+    #[arg(long, default_value_t = ObjOptions::DEFAULT_SIDES, value_name = "N", value_parser = obj_sides())]
+    pub obj_sides: u32,
+    /// Solves the blood flow: CSV files get columns with flow, pressure, velocity and wall shear stress, JSON the flow
+    /// into the organ.
+    #[arg(long, requires = "unit")]
+    pub flow: bool,
     /// Makes the closed meshes for their figures, even if none is written. Files of meshes make them anyway.
     #[arg(long)]
     pub mesh: bool,
@@ -85,6 +111,45 @@ pub struct Options {
     /// Prints one line of JSON per organ, with the figures of its closed meshes if these are made.
     #[arg(long)]
     pub json: bool,
+}
+
+fn obj_sides() -> impl TypedValueParser<Value = u32> {
+    clap::value_parser!(u32).range(i64::from(ObjOptions::MIN_SIDES)..=i64::from(ObjOptions::MAX_SIDES))
+}
+
+/// A unit of lengths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Unit {
+    /// Metres, as in glTF files.
+    M,
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
+    /// Micrometres.
+    #[value(alias = "µm", alias = "μm")]
+    Um,
+}
+
+impl Unit {
+    /// The name on the command line and in files.
+    fn name(self) -> &'static str {
+        match self {
+            Self::M => "m",
+            Self::Cm => "cm",
+            Self::Mm => "mm",
+            Self::Um => "um",
+        }
+    }
+
+    fn scale(self) -> Scale {
+        match self {
+            Self::M => Scale::METRES,
+            Self::Cm => Scale::CENTIMETRES,
+            Self::Mm => Scale::MILLIMETRES,
+            Self::Um => Scale::MICROMETRES,
+        }
+    }
 }
 
 /// A share of the organs.
@@ -114,6 +179,15 @@ pub enum Mode {
 }
 
 impl Mode {
+    /// The name on the command line and in files.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Surface => "surface",
+            Self::Volume => "volume",
+            Self::Staged => "staged",
+        }
+    }
+
     /// The tissue's mode. Stages of the preset stay; otherwise half of all steps go to the surface.
     fn tissue_mode(self, preset: TissueMode, steps: u32) -> TissueMode {
         match (self, preset) {
@@ -146,6 +220,21 @@ pub enum Format {
     ObjMesh,
 }
 
+impl Format {
+    /// The extension of its files.
+    fn extension(self) -> &'static str {
+        match self {
+            Self::Swc => "swc",
+            Self::Obj | Self::ObjMesh => "obj",
+            Self::Csv => "csv",
+            Self::Glb => "glb",
+            Self::Stl => "stl",
+            Self::Ply => "ply",
+            Self::Off => "off",
+        }
+    }
+}
+
 /// Why the command stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
@@ -155,6 +244,9 @@ pub enum Failure {
     /// An error during the run.
     #[error("{0}")]
     Run(String),
+    /// The user, or the system, has asked to stop.
+    #[error("interrupted; files that are there are whole, and --resume goes on after them")]
+    Interrupted,
 }
 
 impl Failure {
@@ -166,11 +258,12 @@ impl Failure {
         Self::Run(cause.to_string())
     }
 
-    /// 2 for wrong usage, as in clap, 1 for the rest.
+    /// 2 for wrong usage, as in clap, 130 after an interruption, as in shells, 1 for the rest.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
             Self::Run(_) => 1,
+            Self::Interrupted => 130,
         }
     }
 }
@@ -183,16 +276,27 @@ struct Job {
     preset: Preset,
     tissue_name: String,
     preset_name: String,
+    run: Run,
+    unit: Option<Unit>,
+    /// The scale for which the flow is solved, if it is.
+    flow_scale: Option<Scale>,
     out: Option<PathBuf>,
+    /// Whether organs whose files are there are skipped.
+    resume: bool,
     formats: Vec<Format>,
+    /// Sides of round cones.
+    obj_sides: u32,
     /// How closed meshes are made, if any are wanted.
     surface: Option<SurfaceSettings>,
     /// Whether they are measured.
     mesh_figures: bool,
 }
 
-/// Grows the requested organs, and reports on `stdout` and in files.
-pub fn run(options: &Options, stdout: &mut impl Write) -> Result<(), Failure> {
+/// Grows the requested organs, and reports on `stdout` and in files. Returns figures of all organs together.
+///
+/// Once `stop` is set, no organ is grown any more, and files under way are finished.
+pub fn run(options: &Options, stdout: &mut impl Write, stop: &AtomicBool) -> Result<Summary, Failure> {
+    let start = Instant::now();
     if options.seed.checked_add(options.count - 1).is_none() {
         return Err(Failure::usage("--seed plus --count is more than a seed can be, 2^64 − 1"));
     }
@@ -201,10 +305,27 @@ pub fn run(options: &Options, stdout: &mut impl Write) -> Result<(), Failure> {
     let organs = options.count.saturating_sub(index).div_ceil(of);
     let seed_of = |organ: u64| options.seed + index + organ * of;
     let threads = options.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
-    batch::grow_all(&job, organs, seed_of, threads, |line| {
-        let text = if options.json { line.json() } else { line.text() };
+    let mut summary = Summary::default();
+    let grown = batch::grow_all(&job, organs, seed_of, threads, stop, |outcome| {
+        summary.add(outcome);
+        let text = if options.json { outcome.json.clone() } else { outcome.line.text() };
         writeln!(stdout, "{text}").map_err(|error| Failure::run(format!("cannot write to standard output: {error}")))
-    })
+    });
+    grown?;
+    summary.seconds = start.elapsed().as_secs_f64();
+    if let Some(folder) = job.out.as_ref().filter(|_| options.count > 1) {
+        summary.save(&folder.join(job.run.organs(&seeds(options), "_summary.json")))?;
+    }
+    Ok(summary)
+}
+
+/// The seeds of all organs, and the share of them that this command grows, as part of a name.
+fn seeds(options: &Options) -> String {
+    let [first, last] = [options.seed, options.seed + options.count - 1].map(identity::padded);
+    match options.shard {
+        Shard { of: 1, .. } => format!("{first}-{last}"),
+        Shard { index, of } => format!("{first}-{last}_{index}-of-{of}"),
+    }
 }
 
 fn prepare(options: &Options) -> Result<Job, Failure> {
@@ -224,15 +345,19 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
     if !(options.lengths.is_finite() && options.lengths > 0.0) {
         return Err(Failure::Usage(format!("--lengths is {}; it must be finite and above 0", options.lengths)));
     }
+    if preset.generator.colonization().is_some_and(|settings| settings.samples == 0) {
+        return Err(Failure::usage("samples is 0, so nothing would grow; it must be at least 1"));
+    }
     let surface = surface_settings(options)?;
-    let tissue = build_tissue(options, &mut preset)?;
+    let (tissue, mesh) = build_tissue(options, &mut preset)?;
     let generator = preset.generator_for(tissue.extent()).scaled(options.lengths);
     for warning in generator.validate().map_err(Failure::usage)? {
         eprintln!("generate: warning: {warning}");
     }
+    let run = Run::new(options, (&preset, &preset_name), &generator, (&*tissue, mesh.as_deref()))?;
     if let Some(folder) = &options.out {
-        let named = |error| Failure::Run(format!("cannot make the folder {}: {error}", folder.display()));
-        std::fs::create_dir_all(folder).map_err(named)?;
+        prepare_folder(folder)?;
+        run.claim(folder)?;
     }
     let mut formats = options.format.clone();
     formats.sort();
@@ -243,11 +368,31 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
         preset,
         tissue_name: options.tissue.display().to_string(),
         preset_name,
+        run,
+        unit: options.unit,
+        flow_scale: options.unit.filter(|_| options.flow).map(Unit::scale),
         out: options.out.clone(),
+        resume: options.resume,
         formats,
+        obj_sides: options.obj_sides,
         surface,
         mesh_figures: options.mesh || options.json,
     })
+}
+
+/// Makes the folder for files, and removes what killed runs left there.
+fn prepare_folder(folder: &Path) -> Result<(), Failure> {
+    const OLD: Duration = Duration::from_secs(60);
+    let is_old = |found: &Metadata| found.modified().is_ok_and(|then| then.elapsed().is_ok_and(|age| age > OLD));
+    let named = |error| Failure::Run(format!("cannot make the folder {}: {error}", folder.display()));
+    fs::create_dir_all(folder).map_err(named)?;
+    match remove_stale(folder, is_old) {
+        Ok(0) => {}
+        Ok(files) => eprintln!("generate: removed {files} temporary files of runs that were killed"),
+        // Files can be written into a folder that cannot be listed.
+        Err(error) => eprintln!("generate: warning: cannot list {}: {error}", folder.display()),
+    }
+    Ok(())
 }
 
 /// Settings of the closed meshes, checked even if none is wanted.
@@ -256,7 +401,7 @@ fn surface_settings(options: &Options) -> Result<Option<SurfaceSettings>, Failur
     let settings = SurfaceSettings { level, most_sides, ..SurfaceSettings::default() };
     let given = format!("--mesh-level {level}, --mesh-sides {most_sides}");
     settings.validate().map_err(|error| Failure::Usage(format!("{given}: {error}")))?;
-    let is_written = options.format.iter().any(|format| format.mesh_ending().is_some());
+    let is_written = options.format.iter().any(|format| format.is_mesh());
     Ok((options.mesh || is_written).then_some(settings))
 }
 
@@ -277,7 +422,11 @@ fn read_preset(options: &Options) -> Result<(Preset, String), Failure> {
     Ok((preset, stem.to_string_lossy().into_owned()))
 }
 
-fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue>, Failure> {
+/// The tissue, and the mesh that it is made of, if of any.
+fn build_tissue(
+    options: &Options,
+    preset: &mut Preset,
+) -> Result<(Arc<dyn Tissue>, Option<Arc<TriangleMesh>>), Failure> {
     let shape = match options.tissue.to_str() {
         Some("disc") => Some(TissueShape::disc(0.5)),
         Some("ball") => Some(TissueShape::ball(0.5)),
@@ -313,5 +462,5 @@ fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue
     }
     let prepared = preset.tissue.prepare(&data);
     let named = |error| Failure::Run(format!("{}: {error}", options.tissue.display()));
-    Ok(Arc::clone(prepared.map_err(named)?.tissue()))
+    Ok((Arc::clone(prepared.map_err(named)?.tissue()), data.mesh))
 }

@@ -8,8 +8,9 @@ use bevy_vessels::synthesis::{
     segment_index::{SegmentIndex, overlaps},
     surface::{Surface, SurfaceError, SurfaceReport},
     tree::{ByKind, VesselTree},
+    units::Scale,
 };
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
@@ -35,22 +36,19 @@ pub fn meshes(job: &Job, growth: &dyn Growth) -> Result<ByKind<Option<Meshed>>, 
 }
 
 impl Format {
-    /// What follows the organ's name in the names of files of closed meshes; `None` for other formats.
-    pub fn mesh_ending(self) -> Option<&'static str> {
-        match self {
-            Self::Glb => Some(".glb"),
-            Self::Stl => Some(".stl"),
-            Self::Ply => Some(".ply"),
-            Self::Off => Some(".off"),
-            // The other OBJ file has the plain name.
-            Self::ObjMesh => Some("_mesh.obj"),
-            Self::Swc | Self::Obj | Self::Csv => None,
-        }
+    /// Whether files in this format hold closed meshes.
+    pub fn is_mesh(self) -> bool {
+        matches!(self, Self::Glb | Self::Stl | Self::Ply | Self::Off | Self::ObjMesh)
     }
 }
 
 /// Writes all kinds to one file, as parts with their names. The format is that of the path's extension.
-pub fn save(path: &Path, meshes: &ByKind<Option<Meshed>>, comments: Vec<String>) -> Result<(), WriteError> {
+pub fn save(
+    path: &Path,
+    meshes: &ByKind<Option<Meshed>>,
+    scale: Option<Scale>,
+    comments: Vec<String>,
+) -> Result<(), WriteError> {
     let parts: Vec<SurfacePart> = meshes
         .iter()
         .filter_map(|(kind, meshed)| Some((kind, meshed.as_ref()?)))
@@ -58,11 +56,11 @@ pub fn save(path: &Path, meshes: &ByKind<Option<Meshed>>, comments: Vec<String>)
         .collect();
     // Programs that measure PLY files often read triangles only.
     let triangles = path.extension().is_some_and(|extension| extension == "ply");
-    save_surface(path, &parts, &SurfaceOptions { comments, triangles, ..SurfaceOptions::default() })
+    save_surface(path, &parts, &SurfaceOptions { scale, comments, triangles })
 }
 
 /// Figures of the mesh of one kind of vessels.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct MeshFigures {
     /// Triangles of the closed surface.
     pub triangles: usize,
@@ -81,8 +79,7 @@ pub struct MeshFigures {
     /// Wall time of the mesh alone, in milliseconds.
     mesh_ms: f64,
     /// What was done where the plain way did not do.
-    #[serde(serialize_with = "as_object")]
-    ladder: Vec<(&'static str, usize)>,
+    ladder: Ladder,
 }
 
 impl MeshFigures {
@@ -101,24 +98,33 @@ impl MeshFigures {
             input_overlaps: overlaps(tree, &SegmentIndex::new(tree)).len(),
             volume: TriangleMesh::new(mesh.positions.clone(), triangles, None).map_or(0.0, |mesh| mesh.signed_volume()),
             mesh_ms: *ms,
-            ladder: ladder(&surface.report),
+            ladder: Ladder::from(&surface.report),
         }
     }
 }
 
-/// The report on a surface as named numbers. A new field of the report is a new line here.
-fn ladder(report: &SurfaceReport) -> Vec<(&'static str, usize)> {
-    vec![
-        ("laterals", report.laterals),
-        ("joined", report.joined),
-        ("shortened", report.shortened),
-        ("moved", report.moved),
-        ("remade", report.remade.len()),
-        ("left", report.left.len()),
-        ("absorbed", report.absorbed.len()),
-    ]
+/// The report on a surface as numbers. A new field of the report is a new line here.
+#[derive(Debug, Serialize, Deserialize)]
+struct Ladder {
+    laterals: usize,
+    joined: usize,
+    shortened: usize,
+    moved: usize,
+    remade: usize,
+    left: usize,
+    absorbed: usize,
 }
 
-fn as_object<S: Serializer>(entries: &[(&'static str, usize)], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(entries.iter().copied())
+impl From<&SurfaceReport> for Ladder {
+    fn from(report: &SurfaceReport) -> Self {
+        Self {
+            laterals: report.laterals,
+            joined: report.joined,
+            shortened: report.shortened,
+            moved: report.moved,
+            remade: report.remade.len(),
+            left: report.left.len(),
+            absorbed: report.absorbed.len(),
+        }
+    }
 }

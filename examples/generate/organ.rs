@@ -1,34 +1,102 @@
 //! One organ: grown, measured, written.
 
+use super::flow::flows;
 use super::mesh::{Meshed, meshes, save};
 use super::report::{KindMeasures, Line};
-use super::{Failure, Format, Job};
+use super::{Failure, Format, Job, Unit};
 use bevy_vessels::synthesis::{
     growth::{Growth, StepCount},
-    io::{ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc, swc_structure},
+    haemodynamics::Network,
+    io::{
+        CsvOptions, ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc, swc_structure, write_atomically,
+    },
     roots::Roots,
     tree::{ByKind, VesselKind, VesselTree, hash_trees},
 };
 use std::fmt::Display;
-use std::path::Path;
+use std::fs;
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+
+/// What became of an organ.
+pub struct Outcome {
+    /// Its report.
+    pub line: Line,
+    /// The same as JSON, to the digit as it was when the organ had grown.
+    pub json: String,
+    /// Whether its files were there already.
+    pub was_there: bool,
+}
 
 /// Grows organ after organ of a job in the same memory.
 pub struct Grower<'a> {
     job: &'a Job,
+    stop: &'a AtomicBool,
     roots: Roots,
     growth: Option<Box<dyn Growth>>,
 }
 
 impl<'a> Grower<'a> {
-    /// Nothing grown yet.
-    pub fn new(job: &'a Job) -> Self {
-        Self { job, roots: job.preset.roots(), growth: None }
+    /// Nothing grown yet. Once `stop` is set, nothing more is.
+    pub fn new(job: &'a Job, stop: &'a AtomicBool) -> Self {
+        Self { job, stop, roots: job.preset.roots(), growth: None }
     }
 
-    /// Grows the organ of a seed, calling `after_step` after each step, and writes its files.
-    pub fn grow(&mut self, seed: u64, mut after_step: impl FnMut(StepCount)) -> Result<Line, Failure> {
+    /// Grows the organ of a seed, calling `after_step` after each step, and writes its files. An organ that is there and
+    /// may be skipped is read.
+    ///
+    /// # Errors
+    /// [`Failure::Interrupted`] if it was to stop before the organ had files.
+    pub fn grow(&mut self, seed: u64, after_step: impl FnMut(StepCount)) -> Result<Outcome, Failure> {
+        if self.job.resume
+            && let Some(outcome) = written(self.job, seed)
+        {
+            return Ok(outcome);
+        }
+        let named = |error: &dyn Display| Failure::Run(format!("{} with seed {seed}: {error}", self.job.tissue_name));
+        let grow_ms = self.run(seed, after_step)?;
+        let Some(growth) = self.growth.as_deref() else { return Err(Failure::Interrupted) };
+        let vessels = growth.trees().map(|_, grown| grown.map(|grown| grown.vessels()));
+        let trees: Vec<(VesselKind, &VesselTree)> = vessels
+            .iter()
+            .filter_map(|(kind, tree)| Some((kind, tree.as_ref().filter(|tree| !tree.is_empty())?)))
+            .collect();
+        trees.iter().try_for_each(|(_, tree)| tree.validate()).map_err(|error| named(&error))?;
+        if trees.iter().all(|(_, tree)| tree.segments().next().is_none()) {
+            eprintln!(
+                "generate: warning: {}",
+                named(&"nothing grew; give more --steps or --samples, or other lengths")
+            );
+        }
+        let meshes = meshes(self.job, growth).map_err(|error| named(&error))?;
+        let measured = meshes.as_ref().map(|_, mesh| mesh.as_ref().filter(|_| self.job.mesh_figures));
+        let flows = match self.job.flow_scale {
+            Some(scale) => flows(&trees, scale).map_err(|error| named(&error))?,
+            None => ByKind::default(),
+        };
+        let hash = hash_trees(growth.trees().values().flatten().map(|grown| grown.tree));
+        let mut line = Line {
+            tissue: self.job.tissue_name.clone(),
+            mode: self.job.run.mode.map(|mode| mode.name().to_owned()),
+            preset: self.job.preset_name.clone(),
+            run: self.job.run.hash.clone(),
+            unit: self.job.unit.map(|unit| unit.name().to_owned()),
+            extent: self.job.tissue.extent().into(),
+            seed,
+            steps: growth.progress().done,
+            grow_ms: (grow_ms * 1e3).round() / 1e3,
+            hash: format!("{hash:016x}"),
+            kinds: KindMeasures::of(growth, &*self.job.tissue, seed, &measured, &flows),
+            files: Vec::new(),
+        };
+        Written { job: self.job, trees: &trees, meshes: &meshes, flows: &flows, seed, hash }.write(&mut line)?;
+        Ok(Outcome { json: line.json(), line, was_there: false })
+    }
+
+    /// Runs the growth of a seed to its end, and returns its milliseconds.
+    fn run(&mut self, seed: u64, mut after_step: impl FnMut(StepCount)) -> Result<f64, Failure> {
         let named = |error: &dyn Display| Failure::Run(format!("{} with seed {seed}: {error}", self.job.tissue_name));
         let (generator, tissue) = (&self.job.generator, Arc::clone(&self.job.tissue));
         let growth = match self.growth.take() {
@@ -38,91 +106,104 @@ impl<'a> Grower<'a> {
         let growth = self.growth.insert(growth.map_err(|error| named(&error))?).as_mut();
         let start = Instant::now();
         while !growth.is_finished() {
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(Failure::Interrupted);
+            }
             growth.advance();
             after_step(growth.progress());
         }
         growth.settle();
-        let grow_ms = 1e3 * start.elapsed().as_secs_f64();
-        let hash = hash_trees(growth.trees().values().flatten().map(|grown| grown.tree));
-        let meshes = meshes(self.job, growth).map_err(|error| named(&error))?;
-        let measured = meshes.as_ref().map(|_, mesh| mesh.as_ref().filter(|_| self.job.mesh_figures));
-        Ok(Line {
-            tissue: self.job.tissue_name.clone(),
-            preset: self.job.preset_name.clone(),
-            extent: self.job.tissue.extent().into(),
-            seed,
-            steps: growth.progress().done,
-            grow_ms: (grow_ms * 1e3).round() / 1e3,
-            hash: format!("{hash:016x}"),
-            kinds: KindMeasures::of(growth, &*self.job.tissue, seed, &measured),
-            files: write_files(self.job, growth, &meshes, seed, hash)?,
-        })
+        Ok(1e3 * start.elapsed().as_secs_f64())
     }
 }
 
-/// Writes the vessels as drawn, and returns the files' paths.
-fn write_files(
-    job: &Job,
-    growth: &dyn Growth,
-    meshes: &ByKind<Option<Meshed>>,
+/// A file of an organ.
+struct Target {
+    format: Format,
+    /// The kind of the vessels if the file has only one.
+    kind: Option<VesselKind>,
+    path: PathBuf,
+}
+
+/// The files of an organ that has these kinds of vessels; none if none are wanted.
+fn targets(job: &Job, seed: u64, kinds: &[VesselKind]) -> Vec<Target> {
+    let Some(folder) = &job.out else { return Vec::new() };
+    let organ = job.run.organ(seed);
+    let target = |format, kind, ending: String| Target { format, kind, path: folder.join(organ.clone() + &ending) };
+    let files = job.formats.iter().flat_map(|&format| match format {
+        Format::Swc => kinds.iter().map(|&kind| target(format, Some(kind), format!("_{}.swc", kind.name()))).collect(),
+        // The other OBJ file has the plain name.
+        Format::ObjMesh => vec![target(format, None, "_mesh.obj".to_owned())],
+        other => vec![target(other, None, format!(".{}", other.extension()))],
+    });
+    files.collect()
+}
+
+/// The file with an organ's report, written once all others are.
+fn report_path(job: &Job, seed: u64) -> Option<PathBuf> {
+    Some(job.out.as_ref()?.join(job.run.organ(seed) + ".json"))
+}
+
+/// The report of an organ all of whose files and figures are there.
+fn written(job: &Job, seed: u64) -> Option<Outcome> {
+    let text = fs::read_to_string(report_path(job, seed)?).ok()?;
+    let mut line: Line = serde_json::from_str(&text).ok()?;
+    let targets = targets(job, seed, &line.kinds.grown());
+    let has_figures = !(job.mesh_figures && job.surface.is_some()) || line.kinds.have_meshes();
+    if !has_figures || !targets.iter().all(|target| target.path.is_file()) {
+        return None;
+    }
+    let files = targets.iter().map(|target| target.path.display().to_string()).collect();
+    let before = std::mem::replace(&mut line.files, files);
+    let json = if before == line.files { text.trim_end().to_owned() } else { line.json() };
+    Some(Outcome { line, json, was_there: true })
+}
+
+/// What is written of an organ.
+struct Written<'a> {
+    job: &'a Job,
+    /// As drawn.
+    trees: &'a [(VesselKind, &'a VesselTree)],
+    meshes: &'a ByKind<Option<Meshed>>,
+    flows: &'a ByKind<Option<Network>>,
     seed: u64,
     hash: u64,
-) -> Result<Vec<String>, Failure> {
-    let Some(folder) = &job.out else {
-        return Ok(Vec::new());
-    };
-    let vessels = growth.trees().map(|_, grown| grown.map(|grown| grown.vessels()));
-    let trees: Vec<(VesselKind, &VesselTree)> = vessels
-        .iter()
-        .filter_map(|(kind, tree)| Some((kind, tree.as_ref().filter(|tree| !tree.is_empty())?)))
-        .collect();
-    let stem = format!("{}_{}_{seed}", file_name(&tissue_stem(job)), file_name(&job.preset_name));
-    let mut files = Vec::new();
-    let mut write = |name: String, write: &dyn Fn(&Path) -> Result<(), WriteError>| {
-        let path = folder.join(name);
-        files.push(path.display().to_string());
-        write(&path).map_err(Failure::run)
-    };
-    for format in &job.formats {
+}
+
+impl Written<'_> {
+    /// Writes all files, and the report with their paths at last.
+    fn write(&self, line: &mut Line) -> Result<(), Failure> {
+        let kinds: Vec<VesselKind> = self.trees.iter().map(|&(kind, _)| kind).collect();
+        for target in targets(self.job, self.seed, &kinds) {
+            self.write_one(&target).map_err(Failure::run)?;
+            line.files.push(target.path.display().to_string());
+        }
+        match report_path(self.job, self.seed) {
+            Some(path) => write_atomically(path, |out| writeln!(out, "{}", line.json())).map_err(Failure::run),
+            None => Ok(()),
+        }
+    }
+
+    fn write_one(&self, Target { format, kind, path }: &Target) -> Result<(), WriteError> {
+        let comments = self.job.run.comments(self.job, *kind, self.seed, self.hash);
+        let scale = self.job.unit.map(Unit::scale);
         match format {
             Format::Swc => {
-                for &(kind, tree) in &trees {
-                    let options =
-                        SwcOptions { comments: comments(job, Some(kind), seed, hash), structure: swc_structure(kind) };
-                    write(format!("{stem}_{}.swc", kind.name()), &|path| save_swc(path, tree, &options))?;
-                }
+                let own = |(tree_kind, _): &&(VesselKind, &VesselTree)| Some(*tree_kind) == *kind;
+                self.trees.iter().find(own).map_or(Ok(()), |&(kind, tree)| {
+                    save_swc(path, tree, &SwcOptions { scale, comments, structure: swc_structure(kind) })
+                })
             }
-            Format::Obj => write(format!("{stem}.obj"), &|path| save_obj(path, &trees, &ObjOptions::default()))?,
-            Format::Csv => write(format!("{stem}.csv"), &|path| save_csv(path, &trees))?,
-            mesh => {
-                if let Some(ending) = mesh.mesh_ending() {
-                    write(format!("{stem}{ending}"), &|path| save(path, meshes, comments(job, None, seed, hash)))?;
-                }
+            Format::Obj => {
+                let options = ObjOptions { comments, sides: self.job.obj_sides, ..ObjOptions::default() };
+                save_obj(path, self.trees, &options)
+            }
+            Format::Csv => {
+                save_csv(path, self.trees, &CsvOptions { flows: self.flows.as_ref().map(|_, of| of.as_ref()) })
+            }
+            Format::Glb | Format::Stl | Format::Ply | Format::Off | Format::ObjMesh => {
+                save(path, self.meshes, scale, comments)
             }
         }
     }
-    Ok(files)
-}
-
-/// Header comments with all that is needed to grow a file's vessels again.
-///
-/// `kind` is that of the vessels if the file has only one.
-fn comments(job: &Job, kind: Option<VesselKind>, seed: u64, hash: u64) -> Vec<String> {
-    let kind = kind.map_or(String::new(), |kind| format!("{} ", kind.name()));
-    vec![
-        format!("{kind}vessels of {}, preset {}, seed {seed}", job.tissue_name, job.preset_name),
-        format!("hash of all kinds of vessels: {hash:016x}"),
-        "unit: that of the tissue".into(),
-    ]
-}
-
-fn tissue_stem(job: &Job) -> String {
-    let path = Path::new(&job.tissue_name);
-    path.file_stem().map_or_else(|| job.tissue_name.clone(), |stem| stem.to_string_lossy().into_owned())
-}
-
-/// A name without characters that are special to a file system or a shell.
-fn file_name(name: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '.';
-    name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect()
 }

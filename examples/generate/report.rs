@@ -4,22 +4,33 @@ use super::mesh::{MeshFigures, Meshed};
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     growth::{GrownTree, Growth},
+    haemodynamics::Network,
     random::Stream,
     tissue::{Extent, Tissue},
-    tree::{ByKind, statistics},
+    tree::{
+        ByKind, VesselKind,
+        statistics::{self, StrahlerOrder},
+    },
 };
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 
 /// Points drawn from the tissue to measure coverage: its standard error is below 0.4 %.
 const COVERAGE_SAMPLES: usize = 20_000;
 
 /// One organ. Its fields are those of the JSON line, in this order.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Line {
     /// The option `--tissue`.
     pub tissue: String,
+    /// Where on a mesh vessels grow; null for a shape.
+    pub mode: Option<String>,
     /// Name of the preset, or of the settings file without its extension.
     pub preset: String,
+    /// Hash of all that the organs of a run have in common, as in the names of its files.
+    pub run: String,
+    /// The option `--unit`; null without.
+    pub unit: Option<String>,
     /// The size of the tissue.
     pub extent: Size,
     /// The organ's seed.
@@ -38,20 +49,27 @@ pub struct Line {
 }
 
 /// The size of a tissue: what a file became, so that a wrong unit or a missing part is seen.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Size {
-    /// `length`, `area` or `volume`.
-    kind: &'static str,
+    kind: SizeKind,
     /// In tissue lengths, square or cubic tissue lengths.
     value: f32,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum SizeKind {
+    Length,
+    Area,
+    Volume,
 }
 
 impl From<Extent> for Size {
     fn from(extent: Extent) -> Self {
         let (kind, value) = match extent {
-            Extent::Length(value) => ("length", value),
-            Extent::Area(value) => ("area", value),
-            Extent::Volume(value) => ("volume", value),
+            Extent::Length(value) => (SizeKind::Length, value),
+            Extent::Area(value) => (SizeKind::Area, value),
+            Extent::Volume(value) => (SizeKind::Volume, value),
         };
         Self { kind, value }
     }
@@ -83,15 +101,33 @@ pub struct KindMeasures(ByKind<Option<Measures>>);
 impl KindMeasures {
     /// Measures the vessels of a finished growth.
     ///
-    /// `meshes` are the surfaces to measure.
-    pub fn of(growth: &dyn Growth, tissue: &dyn Tissue, seed: u64, meshes: &ByKind<Option<&Meshed>>) -> Self {
+    /// `meshes` are the surfaces to measure, `flows` the solved flows.
+    pub fn of(
+        growth: &dyn Growth,
+        tissue: &dyn Tissue,
+        seed: u64,
+        meshes: &ByKind<Option<&Meshed>>,
+        flows: &ByKind<Option<Network>>,
+    ) -> Self {
         let mut rng = Stream::Statistics.rng(seed);
         let supplied = tissue.at_step(growth.progress().done);
         let samples: Vec<Vec3> = (0..COVERAGE_SAMPLES).filter_map(|_| supplied.sample(&mut rng)).collect();
         Self(growth.trees().map(|kind, grown| {
             let mesh = meshes[kind].map(MeshFigures::of);
-            grown.map(|grown| Measures { mesh, ..Measures::of(grown, tissue, &samples) })
+            let inflow_ml_per_min = flows[kind].as_ref().map(|network| network.inflow().ml_per_min());
+            grown.map(|grown| Measures { mesh, inflow_ml_per_min, ..Measures::of(grown, tissue, &samples) })
         }))
+    }
+
+    /// Whether all kinds with vessels have figures of their meshes.
+    pub fn have_meshes(&self) -> bool {
+        self.0.values().flatten().all(|measures| measures.nodes == 0 || measures.mesh.is_some())
+    }
+
+    /// The kinds with vessels.
+    pub fn grown(&self) -> Vec<VesselKind> {
+        let has_nodes = |measures: &Option<Measures>| measures.as_ref().is_some_and(|measures| measures.nodes > 0);
+        self.0.iter().filter(|(_, measures)| has_nodes(measures)).map(|(kind, _)| kind).collect()
     }
 }
 
@@ -101,8 +137,15 @@ impl Serialize for KindMeasures {
     }
 }
 
+impl<'de> Deserialize<'de> for KindMeasures {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut by_name = BTreeMap::<String, Measures>::deserialize(deserializer)?;
+        Ok(Self(ByKind::from_fn(|kind| by_name.remove(kind.name()))))
+    }
+}
+
 /// Statistics of the centre lines of one kind. Values that a tree does not have are null.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Measures {
     nodes: usize,
     leaves: usize,
@@ -113,12 +156,34 @@ pub struct Measures {
     angle_mean_deg: Option<f64>,
     angle_sd_deg: Option<f64>,
     strahler_orders: usize,
+    /// Order by order, from 1.
+    strahler: Vec<OrderMeasures>,
     branching_ratio: Option<f64>,
+    length_ratio: Option<f64>,
+    diameter_ratio: Option<f64>,
     tortuosity_median: Option<f64>,
     coverage: Option<f32>,
     outside: usize,
+    /// Flow through the roots, negative out of the tissue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    inflow_ml_per_min: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     mesh: Option<MeshFigures>,
+}
+
+/// The vessels of one Strahler order.
+#[derive(Debug, Serialize, Deserialize)]
+struct OrderMeasures {
+    /// Number of runs of this order from end to end.
+    streams: usize,
+    mean_length: f64,
+    mean_diameter: f64,
+}
+
+impl From<&StrahlerOrder> for OrderMeasures {
+    fn from(&StrahlerOrder { streams, mean_length, mean_diameter }: &StrahlerOrder) -> Self {
+        Self { streams, mean_length, mean_diameter }
+    }
 }
 
 impl Measures {
@@ -137,10 +202,14 @@ impl Measures {
             angle_mean_deg: measured.bifurcation_angle.map(|angle| angle.mean),
             angle_sd_deg: measured.bifurcation_angle.map(|angle| angle.standard_deviation),
             strahler_orders: measured.strahler_orders(),
+            strahler: measured.strahler.iter().map(OrderMeasures::from).collect(),
             branching_ratio: measured.branching_ratio,
+            length_ratio: measured.length_ratio,
+            diameter_ratio: measured.diameter_ratio,
             tortuosity_median: measured.tortuosity.map(|tortuosity| tortuosity.median),
             coverage: statistics::coverage(tree, samples, reach),
             outside: statistics::outside(tree, |node| tissue.contains(node)),
+            inflow_ml_per_min: None,
             mesh: None,
         }
     }

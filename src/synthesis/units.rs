@@ -44,6 +44,8 @@ pub struct Scale {
 }
 
 impl Scale {
+    /// An organ whose mesh is in micrometres, as traced vessels often are.
+    pub const MICROMETRES: Self = Self { metres_per_length: 1e-6 };
     /// An organ whose mesh is in millimetres.
     pub const MILLIMETRES: Self = Self { metres_per_length: 1e-3 };
     /// An organ whose mesh is in centimetres.

@@ -31,11 +31,7 @@ fn desktop() -> App {
 }
 
 fn organ_file(name: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/organs")).join(name);
-    if !path.exists() {
-        println!("skipped: there is no {}", path.display());
-    }
-    path.exists().then_some(path)
+    shared::folder(&format!("data/organs/{name}"))
 }
 
 #[test]

@@ -21,6 +21,8 @@ mod picking;
 mod presets;
 mod registry;
 mod scene;
+#[path = "../common/shared.rs"]
+mod shared;
 mod sources;
 mod splitting;
 mod surface;

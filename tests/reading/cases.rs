@@ -1,6 +1,7 @@
 //! The shared files that once failed, where they are there. What makes each of them special is also tested without
 //! them.
 
+use crate::shared;
 use bevy_vessels::synthesis::{
     io::{SwcReadOptions, load_mesh, load_swc},
     mesh::TriangleMesh,
@@ -8,12 +9,7 @@ use bevy_vessels::synthesis::{
 use std::path::{Path, PathBuf};
 
 fn folder() -> Option<PathBuf> {
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/cases"));
-    if !folder.is_dir() {
-        println!("skipped: no cases at {}", folder.display());
-        return None;
-    }
-    Some(folder.to_path_buf())
+    shared::folder("cases")
 }
 
 fn read(folder: &Path, name: &str) -> TriangleMesh {

@@ -5,4 +5,6 @@ mod cases;
 mod files;
 mod gltf;
 mod hostile;
+#[path = "../common/shared.rs"]
+mod shared;
 mod swc;

@@ -7,3 +7,5 @@ mod measures;
 mod networks;
 mod real;
 mod shapes;
+#[path = "../common/shared.rs"]
+mod shared;

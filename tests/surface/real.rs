@@ -1,11 +1,12 @@
 //! Real vessels.
 
 use crate::measures::{sound_surface, widened};
+use crate::shared;
 use bevy_vessels::synthesis::{
     io::{SwcReadOptions, load_swc},
     surface::SurfaceSettings,
 };
-use std::{fs, path::Path};
+use std::fs;
 
 /// The organs' arteries and veins have room; the others are planar, or have radii wider than their segments are long.
 const WITHOUT_FAULT: [&str; 6] = [
@@ -19,13 +20,9 @@ const WITHOUT_FAULT: [&str; 6] = [
 
 #[test]
 fn real_vessels_have_closed_surfaces() {
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/vessels"));
-    let Ok(files) = fs::read_dir(folder) else {
-        println!("skipped: no real vessels at {}", folder.display());
-        return;
-    };
+    let Some(folder) = shared::folder("data/vessels") else { return };
     let mut count = 0;
-    for path in files.map(|entry| entry.expect("an entry").path()) {
+    for path in fs::read_dir(&folder).expect("a readable folder").map(|entry| entry.expect("an entry").path()) {
         let name = path.file_stem().and_then(|name| name.to_str()).unwrap_or_default().to_owned();
         if path.extension().is_none_or(|extension| extension != "swc") {
             continue;

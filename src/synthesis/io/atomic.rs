@@ -1,6 +1,6 @@
 //! Files that are written whole or not at all.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -62,8 +62,8 @@ fn unknown(extension: &str) -> String {
 ///
 /// The content goes to a temporary file in the same folder, which is flushed, synchronised with the disk, and renamed
 /// to the file in one step. If anything fails, or `write` panics, the temporary file is removed. A process that is
-/// killed can leave one behind, with a name that ends in `.tmp`; nothing reads it. A symbolic link at the path is
-/// replaced, not followed. A replaced file passes on its permissions.
+/// killed can leave one behind, with a name that ends in `.tmp`; nothing reads it, and [`remove_stale`] removes it. A
+/// symbolic link at the path is replaced, not followed. A replaced file passes on its permissions.
 ///
 /// # Errors
 /// The failure, with the path. The file at the path is unchanged then.
@@ -102,7 +102,7 @@ impl Temporary {
     const TRIES: u32 = 1000;
 
     /// Makes a new, empty file in the folder of `target`, under a name that no other file, thread or process has.
-    fn create(target: &Path, name: &std::ffi::OsStr) -> io::Result<(File, Self)> {
+    fn create(target: &Path, name: &OsStr) -> io::Result<(File, Self)> {
         static COUNTER: AtomicU32 = AtomicU32::new(0);
         for _ in 0..Self::TRIES {
             let number = COUNTER.fetch_add(1, Ordering::Relaxed);
@@ -111,7 +111,11 @@ impl Temporary {
             hidden.push(format!(".{}-{number}.tmp", std::process::id()));
             let path = target.with_file_name(hidden);
             match OpenOptions::new().write(true).create_new(true).open(&path) {
-                Ok(file) => return Ok((file, Self { path, is_done: false })),
+                Ok(file) => {
+                    // Says that someone writes it. Where files cannot be locked, its age alone says so.
+                    let _ = file.try_lock();
+                    return Ok((file, Self { path, is_done: false }));
+                }
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -134,6 +138,38 @@ impl Drop for Temporary {
             let _ = fs::remove_file(&self.path);
         }
     }
+}
+
+/// Removes the temporary files that killed processes left in a folder, and returns their number.
+///
+/// Such a file has a name that [`write_atomically`] gives, and is locked by no process. `is_old` says of it whether it has
+/// not been written for a while, such as a minute: for a moment a living writer may have its file unlocked. Files that
+/// other processes write at this time, on this or another machine, stay, as does what cannot be locked or removed.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn remove_stale(folder: impl AsRef<Path>, is_old: impl Fn(&fs::Metadata) -> bool) -> io::Result<usize> {
+    let mut removed = 0;
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let is_stale = is_temporary(&entry.file_name())
+            // Before it is opened, since opening a pipe waits for a reader.
+            && entry.metadata().is_ok_and(|found| found.is_file() && is_old(&found))
+            && OpenOptions::new().write(true).open(entry.path()).is_ok_and(|file| file.try_lock().is_ok());
+        if is_stale && fs::remove_file(entry.path()).is_ok() {
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
+/// Whether a name is `.NAME.PROCESS-NUMBER.tmp`.
+fn is_temporary(name: &OsStr) -> bool {
+    let inner = name.as_encoded_bytes().strip_prefix(b".").and_then(|name| name.strip_suffix(b".tmp"));
+    let Some(numbers) = inner.and_then(|inner| inner.rsplit(|&byte| byte == b'.').next()) else { return false };
+    let mut parts = numbers.split(|&byte| byte == b'-');
+    let mut is_number = || parts.next().is_some_and(|part| !part.is_empty() && part.iter().all(u8::is_ascii_digit));
+    is_number() && is_number() && parts.next().is_none()
 }
 
 /// Makes the new name survive a power cut, if folders can be synchronised. The content is safe either way.

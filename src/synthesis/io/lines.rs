@@ -1,4 +1,4 @@
-//! The lines of text files, whatever ends them, and the encodings that are told apart.
+//! The lines of text files: what is read, whatever ends them and in which encoding, and what is written as comments.
 
 /// Text of two bytes a letter, which no reader takes.
 #[derive(Debug, PartialEq, Eq)]
@@ -47,6 +47,25 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
+/// A user's comments as lines that no format takes for data: each on one line, those without a letter left out.
+pub(super) fn comment_lines(comments: &[String]) -> impl Iterator<Item = String> + '_ {
+    comments.iter().flat_map(|comment| comment.split(['\n', '\r'])).map(one_line).filter(|line| !line.is_empty())
+}
+
+/// A text on one line: control characters, line breaks among them, become spaces.
+///
+/// A backslash would join the line to the next one in OBJ; it becomes a slash.
+pub(super) fn one_line(text: &str) -> String {
+    let plain = |letter: char| match letter {
+        '\\' => '/',
+        // Unicode's own line breaks are not control characters.
+        '\u{2028}' | '\u{2029}' => ' ',
+        letter if letter.is_control() => ' ',
+        letter => letter,
+    };
+    text.chars().map(plain).collect::<String>().trim().to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -58,6 +77,13 @@ mod tests {
         assert_eq!(lines, expected);
         assert_eq!(Lines::new(b"").count(), 0);
         assert_eq!(Lines::new(b"a").collect::<Vec<_>>(), [(1, &b"a"[..])]);
+    }
+
+    #[test]
+    fn comments_stay_on_their_lines() {
+        let comments = ["seed 7\r\npreset \"liver\"\n\n".to_owned(), "path C:\\x\\\t\u{0}\rv 0 0 0".to_owned()];
+        let lines: Vec<String> = comment_lines(&comments).collect();
+        assert_eq!(lines, ["seed 7", "preset \"liver\"", "path C:/x/", "v 0 0 0"]);
     }
 
     #[test]

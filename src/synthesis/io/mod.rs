@@ -36,7 +36,7 @@ mod regular_file;
 mod surface;
 mod tree;
 
-pub use atomic::{WriteError, write_atomically};
+pub use atomic::{WriteError, remove_stale, write_atomically};
 #[cfg(feature = "mesh_files")]
 pub use mesh::{MeshDataError, MeshReadError, load_mesh, read_glb, read_obj_mesh};
 pub use mesh::{ObjOptions, save_obj, write_obj};
@@ -47,6 +47,6 @@ pub use surface::{
 #[cfg(feature = "mesh_files")]
 pub use surface::{save_surface_glb, write_surface_glb};
 pub use tree::{
-    ReadError, SwcOptions, SwcReadOptions, kind_of_swc_structure, load_swc, read_swc, save_csv, save_swc,
+    CsvOptions, ReadError, SwcOptions, SwcReadOptions, kind_of_swc_structure, load_swc, read_swc, save_csv, save_swc,
     swc_structure, write_csv, write_swc,
 };

@@ -5,6 +5,7 @@
 //! ([`Stream::Roots`](crate::synthesis::random::Stream::Roots)).
 
 mod error;
+mod hollow;
 mod placement;
 mod resolve;
 mod spread;

@@ -2,6 +2,7 @@
 
 use super::{
     RootError, RootPlacement, RootSpacing, Roots,
+    hollow::hilum,
     spread::{beside, spread},
     within::within,
 };
@@ -44,6 +45,10 @@ impl Roots {
             roots[kind] = match placement {
                 RootPlacement::None => Vec::new(),
                 RootPlacement::Spread(count) => spread(tissue, kind, *count, &mut rng)?,
+                RootPlacement::Hilum => match hilum(tissue, diameter, &mut rng) {
+                    Some(floor) => vec![floor],
+                    None => spread(tissue, kind, 1, &mut rng)?,
+                },
                 RootPlacement::Within(reach) => {
                     check_reach(kind, *reach)?;
                     within(tissue, kind, reach * diameter, own.reach, &mut rng)?

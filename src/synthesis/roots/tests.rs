@@ -45,6 +45,29 @@ fn the_default_is_an_artery_and_a_vein_beside_it() -> Result<(), TissueError> {
     Ok(())
 }
 
+/// What is convex has no hollow: then the seed chooses.
+#[test]
+fn a_hilum_is_in_a_hollow() -> Result<(), TissueError> {
+    let at_hilum = placed_arteries(RootPlacement::Hilum);
+    let ball = Ball::new(Vec3::ONE, 0.5)?;
+    let root = |seed| at_hilum.resolve(&ball, &SPACING, seed).map(|roots| roots.artery[0].position);
+    assert!(root(1).is_ok_and(|root| ball.contains(root)) && root(1) != root(2));
+    // A square of edge 3 without its middle at the right: the floor of the slot is at x = 1.
+    let corners = [(0., 0.), (3., 0.), (3., 1.), (1., 1.), (1., 2.), (3., 2.), (3., 3.), (0., 3.)];
+    let positions = corners.map(|(x, y)| at(x, y)).to_vec();
+    let triangles = vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 7], [4, 5, 6], [4, 6, 7]];
+    let slot = MeshSurface::new(TriangleMesh::new(positions, triangles, None)?)?;
+    for seed in 0..20 {
+        let roots = at_hilum.resolve(&slot, &SPACING, seed).map_err(|error| error.to_string());
+        let root = roots.map(|roots| roots.artery[0].position);
+        assert!(
+            root.as_ref().is_ok_and(|root| (0.9..3.0).contains(&root.x) && (0.9..2.1).contains(&root.y)),
+            "{root:?}"
+        );
+    }
+    Ok(())
+}
+
 #[test]
 fn spread_roots_are_far_apart() -> Result<(), TissueError> {
     let tissue = Disc::flat(0.5)?;

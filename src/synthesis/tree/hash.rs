@@ -12,6 +12,11 @@ fn feed(hash: u64, bytes: &[u8]) -> u64 {
     bytes.iter().fold(hash, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME))
 }
 
+/// Hash of any data, given piece by piece, such as settings that were grown with or the mesh that was grown on.
+pub fn hash_bytes<B: AsRef<[u8]>>(pieces: impl IntoIterator<Item = B>) -> u64 {
+    pieces.into_iter().fold(OFFSET_BASIS, |hash, piece| feed(hash, piece.as_ref()))
+}
+
 /// Hash of several trees in a row, such as the arteries and the veins of an organ.
 ///
 /// Covers the number of nodes and the exact bits of all positions, parents and radii, in little-endian order, of one
@@ -51,5 +56,6 @@ mod tests {
         assert_eq!(feed(OFFSET_BASIS, b""), 0xcbf2_9ce4_8422_2325);
         assert_eq!(feed(OFFSET_BASIS, b"a"), 0xaf63_dc4c_8601_ec8c);
         assert_eq!(feed(OFFSET_BASIS, b"foobar"), 0x8594_4171_f739_67e8);
+        assert_eq!(hash_bytes(["foo", "", "bar"]), 0x8594_4171_f739_67e8);
     }
 }

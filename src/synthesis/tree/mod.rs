@@ -17,7 +17,7 @@ pub mod validate;
 
 pub use bed_links::BedLink;
 pub use error::TreeError;
-pub use hash::hash_trees;
+pub use hash::{hash_bytes, hash_trees};
 pub use kind::{ByKind, VesselKind};
 pub use place::Place;
 pub use statistics::TreeStatistics;

@@ -4,7 +4,7 @@
 //! axis; the rings where the cone touches the spheres are shared, so normals are smooth all over. Tubes of neighbouring
 //! segments overlap at their common node, which hides the joint. One vessel is thus many closed pieces, not one surface.
 
-use crate::synthesis::io::{WriteError, write_atomically};
+use crate::synthesis::io::{WriteError, lines::comment_lines, write_atomically};
 use crate::synthesis::segment_index::start_radius;
 use crate::synthesis::tree::{VesselKind, VesselTree};
 use bevy_math::{Vec3, ops};
@@ -12,9 +12,13 @@ use std::f32::consts::{PI, TAU};
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 
-/// The fineness of segments in the file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The header of the file, and the fineness of its segments.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ObjOptions {
+    /// Lines of the header, such as the unit of lengths, the seed and the preset. A line break begins a new line.
+    ///
+    /// Default: none. The name and version of this crate are always written.
+    pub comments: Vec<String>,
     /// Sides of a tube. More make it rounder and the file larger, in proportion.
     ///
     /// Limits: [`Self::MIN_SIDES`] to [`Self::MAX_SIDES`]; values beyond are clamped. Default: [`Self::DEFAULT_SIDES`].
@@ -40,7 +44,7 @@ impl ObjOptions {
 
 impl Default for ObjOptions {
     fn default() -> Self {
-        Self { sides: Self::DEFAULT_SIDES, cap_rings: Self::DEFAULT_CAP_RINGS }
+        Self { comments: Vec::new(), sides: Self::DEFAULT_SIDES, cap_rings: Self::DEFAULT_CAP_RINGS }
     }
 }
 
@@ -76,6 +80,9 @@ pub fn write_obj(mut out: impl Write, trees: &[(VesselKind, &VesselTree)], optio
         return Err(io::Error::new(ErrorKind::InvalidInput, message));
     }
     writeln!(out, "# {} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))?;
+    for line in comment_lines(&options.comments) {
+        writeln!(out, "# {line}")?;
+    }
     let mut written = 0;
     for &(system, tree) in trees {
         writeln!(out, "g {}", system.name())?;

@@ -1,5 +1,6 @@
 //! The options of a file, and its remarks: who made it, the unit of its lengths, and the caller's own lines.
 
+use crate::synthesis::io::lines::comment_lines;
 use crate::synthesis::units::Scale;
 
 /// The contents of a surface file besides the surfaces, and the form of faces.
@@ -24,28 +25,13 @@ impl SurfaceOptions {
     /// All remarks as lines without control characters: the generator, the unit, the comments.
     pub(super) fn lines(&self) -> Vec<String> {
         let unit = self.scale.map(|scale| format!("unit: {} m", scale.metres()));
-        let own = self.comments.iter().flat_map(|comment| comment.split(['\n', '\r'])).map(one_line);
-        [generator()].into_iter().chain(unit).chain(own.filter(|line| !line.is_empty())).collect()
+        [generator()].into_iter().chain(unit).chain(comment_lines(&self.comments)).collect()
     }
 }
 
 /// Name and version of this crate.
 pub(super) fn generator() -> String {
     format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))
-}
-
-/// A text on one line: control characters, line breaks among them, become spaces.
-///
-/// A backslash would join the line to the next one in OBJ; it becomes a slash.
-pub(super) fn one_line(text: &str) -> String {
-    let plain = |letter: char| match letter {
-        '\\' => '/',
-        // Unicode's own line breaks are not control characters.
-        '\u{2028}' | '\u{2029}' => ' ',
-        letter if letter.is_control() => ' ',
-        letter => letter,
-    };
-    text.chars().map(plain).collect::<String>().trim().to_owned()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The parts of a surface file, and their check before anything is written.
 
-use super::notes::one_line;
+use crate::synthesis::io::lines::one_line;
 use crate::synthesis::surface::SurfaceMesh;
 use crate::synthesis::tree::{ByKind, VesselKind, VesselTree};
 use bevy_math::ops;

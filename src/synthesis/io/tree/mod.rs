@@ -4,6 +4,6 @@ mod csv;
 mod swc;
 mod swc_read;
 
-pub use csv::{save_csv, write_csv};
+pub use csv::{CsvOptions, save_csv, write_csv};
 pub use swc::{SwcOptions, kind_of_swc_structure, save_swc, swc_structure, write_swc};
 pub use swc_read::{ReadError, SwcReadOptions, load_swc, read_swc};

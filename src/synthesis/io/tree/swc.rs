@@ -4,14 +4,20 @@
 //! Source: Cannon, Turner, Pyapali & Wheal, "An on-line archive of reconstructed hippocampal neurons" (1998), and the
 //! `SWCplus` specification (neuroinformatics.nl/swcPlus). A file may have several roots.
 
-use crate::synthesis::io::{WriteError, write_atomically};
+use crate::synthesis::io::{WriteError, lines::comment_lines, write_atomically};
 use crate::synthesis::tree::{NO_PARENT, VesselKind, VesselTree};
+use crate::synthesis::units::Scale;
 use std::io::{self, Write};
 use std::path::Path;
 
 /// The contents of an SWC file besides the tree.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SwcOptions {
+    /// Size of a tissue length. With it, lengths are written in micrometres, as other programs take those of an SWC
+    /// file to be, and the header names the unit.
+    ///
+    /// Default: none. Lengths are written as they are, and the file says nothing about units.
+    pub scale: Option<Scale>,
     /// Lines of the header, such as the units of lengths, the seed and the preset. A line break begins a new line.
     ///
     /// Default: none. The name and version of this crate and the names of the columns are always written.
@@ -37,6 +43,8 @@ pub fn kind_of_swc_structure(structure: u32) -> Option<VesselKind> {
 /// The type of arteries.
 const FIRST_STRUCTURE: u32 = 10;
 
+const MICROMETRES_PER_METRE: f64 = 1e6;
+
 /// Writes a tree to an SWC file, whole or not at all. See [`write_swc`].
 ///
 /// # Errors
@@ -45,7 +53,7 @@ pub fn save_swc(path: impl AsRef<Path>, tree: &VesselTree, options: &SwcOptions)
     write_atomically(path, |out| write_swc(out, tree, options))
 }
 
-/// Writes a tree as SWC, nodes in the tree's order, lengths as they are.
+/// Writes a tree as SWC, nodes in the tree's order, lengths as they are or in micrometres.
 ///
 /// Every number has enough digits to be read back to the same bits. An empty tree gives only a header. Lengths beyond
 /// ±[`MAX_COORDINATE`](crate::synthesis::mesh::MAX_COORDINATE) are written, but not read again.
@@ -54,14 +62,22 @@ pub fn save_swc(path: impl AsRef<Path>, tree: &VesselTree, options: &SwcOptions)
 /// Those of `out`.
 pub fn write_swc(mut out: impl Write, tree: &VesselTree, options: &SwcOptions) -> io::Result<()> {
     writeln!(out, "# {} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"))?;
-    for line in options.comments.iter().flat_map(|comment| comment.lines()) {
+    if let Some(scale) = options.scale {
+        writeln!(out, "# unit: um; a tissue length is {} m", scale.metres())?;
+    }
+    for line in comment_lines(&options.comments) {
         writeln!(out, "# {line}")?;
     }
+    let written = |length: f32| match options.scale {
+        Some(scale) => (scale.to_metres(length) * MICROMETRES_PER_METRE) as f32,
+        None => length,
+    };
     writeln!(out, "# id type x y z radius parent")?;
     let nodes = tree.positions().iter().zip(tree.radii()).zip(tree.parents());
     for (index, ((position, radius), &parent)) in nodes.enumerate() {
         let (id, structure) = (index + 1, options.structure);
-        write!(out, "{id} {structure} {} {} {} {radius} ", position.x, position.y, position.z)?;
+        let [x, y, z, radius] = [position.x, position.y, position.z, *radius].map(written);
+        write!(out, "{id} {structure} {x} {y} {z} {radius} ")?;
         if parent == NO_PARENT {
             writeln!(out, "-1")?;
         } else {

@@ -284,15 +284,19 @@ fn lumen_view(wall: &Wall) -> Viewpoint {
     Viewpoint { eye: best.1, target: best.2, up: if level { Vec3::Y } else { Vec3::Z } }
 }
 
-/// Places along the mesenteric border, arteries and veins beside each other.
+/// Places along the mesenteric border, arteries and veins beside each other; two of them on the appendix, whose artery
+/// accompanies it in a mesentery of its own.
 fn root_sites(wall: &Wall, side: Side, count: usize) -> RootSites {
     let mut sites = RootSites::default();
     let first = wall.apex + 0.04 * (wall.end - wall.apex);
     let step = (wall.end - first) / count as f32;
-    for index in 0..count {
-        let arc = first + (index as f32 + 0.4) * step;
+    let appendix = wall.apex - wall.start(side);
+    let shares = if appendix > 0.0 { &[0.3, 0.7][..] } else { &[] };
+    let own = shares.iter().map(|share| (wall.start(side) + share * appendix, 0.5 * appendix));
+    let along = (0..count).map(|index| (first + (index as f32 + 0.4) * step, step));
+    for (arc, room) in own.chain(along) {
         for (shift, points) in [(-0.04, &mut sites.arterial), (0.04, &mut sites.venous)] {
-            let section = wall.section(side, arc + shift * step);
+            let section = wall.section(side, arc + shift * room);
             let radius = wall.radius(side, &section, 0.0);
             points.push(section.frame.centre + section.frame.direction(0.0) * radius);
         }

@@ -1,24 +1,34 @@
 //! The batch command: the same organ for any split of the work, whole files, clear errors.
 
-#[path = "../examples/generate/command.rs"]
+#[path = "../../examples/generate/command.rs"]
 mod command;
+mod mesh;
+mod runs;
 
 use bevy_vessels::synthesis::{
     io::{SwcReadOptions, load_swc},
     preset::PresetName,
 };
 use clap::Parser;
+use command::Summary;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
-/// Runs the command on a small organ and returns its lines of JSON without the time, which differs between runs.
+/// Runs the command on a small organ and returns its lines of JSON without the times, which differ between runs.
 fn generate(arguments: &[&str]) -> Vec<Value> {
     let text = output(&[&["--json"], arguments].concat()).expect("organs");
     let line = |line: &str| {
         let mut line: Value = serde_json::from_str(line).expect("a line of JSON");
         assert!(line["grow_ms"].as_f64().is_some_and(|ms| ms > 0.0));
         line["grow_ms"] = Value::Null;
+        for kind in ["arterial", "venous"] {
+            if let Some(ms) = line[kind].get_mut("mesh").and_then(|mesh| mesh.get_mut("mesh_ms")) {
+                assert!(ms.as_f64().is_some_and(|ms| ms > 0.0));
+                *ms = Value::Null;
+            }
+        }
         line
     };
     text.lines().map(line).collect()
@@ -30,11 +40,16 @@ fn output(arguments: &[&str]) -> Result<String, command::Failure> {
 
 /// Runs the command with these arguments only.
 fn run(arguments: &[&str]) -> Result<String, command::Failure> {
+    Ok(run_until(&AtomicBool::new(false), arguments)?.0)
+}
+
+/// The same until it is to stop. Returns what it writes, and its summary.
+fn run_until(stop: &AtomicBool, arguments: &[&str]) -> Result<(String, Summary), command::Failure> {
     let all = [&["generate"], arguments].concat();
     let options = command::Options::try_parse_from(all).map_err(|error| command::Failure::Usage(error.to_string()))?;
     let mut bytes = Vec::new();
-    command::run(&options, &mut bytes)?;
-    Ok(String::from_utf8(bytes).expect("text"))
+    let summary = command::run(&options, &mut bytes, stop)?;
+    Ok((String::from_utf8(bytes).expect("text"), summary))
 }
 
 fn failure(arguments: &[&str]) -> (u8, String) {
@@ -55,12 +70,31 @@ impl Folder {
     fn path(&self, name: &str) -> String {
         self.0.join(name).display().to_string()
     }
+
+    /// Names of what is in a folder below, sorted.
+    fn names(&self, below: &str) -> Vec<String> {
+        let entries = fs::read_dir(self.0.join(below)).expect("a folder");
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
 }
 
 impl Drop for Folder {
     fn drop(&mut self) {
         fs::remove_dir_all(&self.0).ok();
     }
+}
+
+/// The files of an organ.
+fn files_of(line: &Value) -> Vec<&str> {
+    line["files"].as_array().expect("files").iter().filter_map(Value::as_str).collect()
+}
+
+/// The hash of a run in the names of its files.
+fn run_of(line: &Value) -> &str {
+    line["run"].as_str().expect("a hash")
 }
 
 #[test]
@@ -93,7 +127,10 @@ fn an_organ_is_the_same_whatever_count_shard_and_threads() {
 fn a_line_has_the_fields_that_scripts_read() {
     let text = output(&["--json", "--tissue=box"]).expect("an organ");
     // In this order, which the parsed object does not keep.
-    let keys = ["tissue", "preset", "extent", "seed", "steps", "grow_ms", "hash", "arterial", "venous", "files"];
+    let keys = [
+        "tissue", "mode", "preset", "run", "unit", "extent", "seed", "steps", "grow_ms", "hash", "arterial", "venous",
+        "files",
+    ];
     let mut at = 0;
     for key in keys {
         at += text[at..].find(&format!("\"{key}\":")).unwrap_or_else(|| panic!("{key} is missing or out of place"));
@@ -103,7 +140,7 @@ fn a_line_has_the_fields_that_scripts_read() {
     assert_eq!((&line["tissue"], &line["preset"], &line["steps"]), (&"box".into(), &"paper".into(), &12.into()));
     for kind in ["arterial", "venous"] {
         let measures = line[kind].as_object().expect("an object");
-        assert_eq!(measures.len(), 13);
+        assert_eq!(measures.len(), 16);
         for key in [
             "nodes",
             "leaves",
@@ -114,7 +151,10 @@ fn a_line_has_the_fields_that_scripts_read() {
             "angle_mean_deg",
             "angle_sd_deg",
             "strahler_orders",
+            "strahler",
             "branching_ratio",
+            "length_ratio",
+            "diameter_ratio",
             "tortuosity_median",
             "coverage",
             "outside",
@@ -131,12 +171,19 @@ fn files_hold_the_vessels_that_are_reported() {
     let out = folder.path("made/for/it");
     let [line] =
         generate(&["--tissue=ball", "--seed=3", "--out", &out, "--format=swc,obj,csv,swc"]).try_into().expect("one");
-    let files: Vec<&str> = line["files"].as_array().expect("files").iter().filter_map(Value::as_str).collect();
-    let names = ["ball_paper_3_arterial.swc", "ball_paper_3_venous.swc", "ball_paper_3.obj", "ball_paper_3.csv"];
-    assert_eq!(files, names.map(|name| Path::new(&out).join(name).display().to_string()));
-    assert_eq!(fs::read_dir(&out).expect("a folder").count(), 4, "nothing else is left there");
+    let files = files_of(&line);
+    let organ = format!("ball_paper_{}_000003", run_of(&line));
+    let endings = ["_arterial.swc", "_venous.swc", ".obj", ".csv"];
+    assert_eq!(files, endings.map(|ending| Path::new(&out).join(organ.clone() + ending).display().to_string()));
+    let besides = [organ.clone() + ".json", organ.replace("_000003", ".ron")];
+    let mut names = [&endings.map(|ending| organ.clone() + ending)[..], &besides].concat();
+    names.sort();
+    assert_eq!(folder.names("made/for/it"), names, "nothing else is left there");
+    let report: Value =
+        serde_json::from_str(&fs::read_to_string(Path::new(&out).join(&besides[0])).expect("a report")).expect("JSON");
+    assert_eq!((&report["hash"], &report["files"]), (&line["hash"], &line["files"]));
     let mut segments = 0;
-    for (file, kind) in files.iter().zip(["arterial", "venous"]) {
+    for (file, kind) in files.iter().take(2).zip(["arterial", "venous"]) {
         let tree = load_swc(file, &SwcReadOptions::default()).expect("a tree");
         let statistics = tree.statistics();
         assert_eq!(line[kind]["nodes"].as_u64(), Some(statistics.nodes as u64));
@@ -299,6 +346,12 @@ fn wrong_usage_is_named_with_exit_code_2() {
         (&["--set=arterial.direction_weight=7"], "direction_weight is 7; it must be between 0 and 1"),
         (&["--steps=0"], "steps is 0; it must be at least 1"),
         (&["--samples=4000000000"], "samples is 4000000000"),
+        (&["--samples=0"], "--samples"),
+        (&["--obj-sides=2"], "3..=64"),
+        (&["--obj-sides=65"], "3..=64"),
+        (&["--flow"], "--unit"),
+        (&["--unit=inch"], "possible values: m, cm, mm, um"),
+        (&["--resume"], "--out"),
         (&["--lengths=0"], "--lengths is 0; it must be finite and above 0"),
         (&["--lengths=NaN"], "--lengths is NaN"),
         (&["--shard=2/2"], "I from 0 to N − 1"),
@@ -342,15 +395,15 @@ fn what_goes_wrong_is_named_with_exit_code_1_and_leaves_nothing_half_done() {
     // A folder has the name of the second organ's file: the first organ's file is whole, and the second's does not
     // exist.
     let out = folder.path("out");
-    fs::create_dir_all(folder.path("out/disc_paper_2.csv")).expect("a folder");
+    let run = format!("disc_paper_{}", run_of(&generate(&[])[0]));
+    fs::create_dir_all(folder.path(&format!("out/{run}_000002.csv"))).expect("a folder");
     let (code, message) = failure(&["--count=100000", "--threads=2", "--out", &out, "--format=csv", "--json"]);
-    assert!(code == 1 && message.contains("disc_paper_2.csv"), "{message}");
-    let first = fs::read_to_string(folder.path("out/disc_paper_1.csv")).expect("the first organ");
+    assert!(code == 1 && message.contains(&format!("{run}_000002.csv")), "{message}");
+    let first = fs::read_to_string(folder.path(&format!("out/{run}_000001.csv"))).expect("the first organ");
     assert!(first.ends_with('\n') && first.lines().count() > 10);
-    let names: Vec<PathBuf> =
-        fs::read_dir(&out).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
-    assert!(names.iter().all(|name| name.extension().is_some_and(|extension| extension == "csv")), "{names:?}");
-    assert!(names.len() < 40, "the batch goes on after a failure");
+    let names = folder.names("out");
+    assert!(names.iter().all(|name| [".csv", ".json", ".ron"].iter().any(|end| name.ends_with(end))), "{names:?}");
+    assert!(names.len() < 80, "the batch goes on after a failure");
 }
 
 /// A closed pipe.
@@ -370,7 +423,7 @@ impl std::io::Write for Closed {
 fn a_closed_pipe_stops_the_batch() {
     let arguments = ["generate", "--steps=2", "--count=1000000000000", "--threads=2"];
     let options = command::Options::try_parse_from(arguments).expect("options");
-    let failure = command::run(&options, &mut Closed).expect_err("nobody reads");
+    let failure = command::run(&options, &mut Closed, &AtomicBool::new(false)).expect_err("nobody reads");
     assert_eq!(failure.exit_code(), 1);
     assert!(failure.to_string().contains("standard output"), "{failure}");
 }
