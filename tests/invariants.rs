@@ -139,13 +139,15 @@ impl<'a> Run<'a> {
         assert_eq!((now.len(), now.len()), (births.len(), growth.normals(kind).len()));
     }
 
-    /// New segments are as long as a step, and leave from nodes that may have another child.
+    /// New segments are as long as a step, and leave from nodes that may have another child. On a bent surface, several
+    /// make up a step.
     fn check_new_segments(&self, kind: VesselKind) {
         let (growth, tree) = (&self.growth, self.growth.tree(kind));
         let settings = growth.settings().system(kind).expect("it is grown");
         let step = settings.step_length * self.scales[kind.index()];
         let first_new = self.before[kind.index()].len();
         let grown_from = self.before[kind.index()].child_counts();
+        let (children, mut way) = (tree.child_counts(), vec![0.0; tree.len()]);
         for (node, parent) in tree.segments().filter(|&(node, _)| node >= first_new) {
             let length = tree.segment_vector(node).length();
             assert!(length > 0.0, "node {node} lies on its parent");
@@ -155,8 +157,17 @@ impl<'a> Run<'a> {
             } else {
                 assert!((length / step - 1.0).abs() < 1e-3, "segment {node} of length {length}, step {step}");
             }
-            assert!(parent < first_new, "node {node} grew from a node of the same step");
-            if !settings.lateral_sprouts && tree.parents()[parent] != NO_PARENT {
+            let bends = self.case.tissue.has_facets() && growth.settings().confine;
+            if bends && parent >= first_new {
+                // Each goes on from the one before.
+                assert_eq!((parent, children[parent]), (node - 1, 1), "node {node} is beside a bend");
+                way[node] = way[parent] + length;
+            } else {
+                assert!(parent < first_new, "node {node} grew from a node of the same step");
+                way[node] = length;
+            }
+            assert!(!bends || way[node] <= step * 1.001, "a way of {} to node {node}, step {step}", way[node]);
+            if parent < first_new && !settings.lateral_sprouts && tree.parents()[parent] != NO_PARENT {
                 assert_eq!(grown_from[parent], 0, "node {node} sprouts sideways");
             }
         }

@@ -4,6 +4,7 @@ mod common;
 
 use bevy_vessels::synthesis::{
     colonization::{AngleSpread, Colonization, ColonizationError, ColonizationSettings, SystemSettings},
+    mesh::MAX_COORDINATE,
     random::{Stream, VesselRng},
     roots::RootError,
     tissue::TissueGrowth,
@@ -41,7 +42,7 @@ impl Lengths {
             Self::Any if rng.random_bool(0.9) => rng.random_range(-3.5..0.5),
             Self::Any => rng.random_range(-37.0..37.0),
         };
-        10.0_f32.powf(exponent)
+        10.0_f32.powf(exponent).min(MAX_COORDINATE)
     }
 
     fn length_or_zero(self, rng: &mut VesselRng) -> f32 {

@@ -7,6 +7,7 @@
 use crate::synthesis::generator::{Generator, GeneratorError};
 use crate::synthesis::roots::{RootPlacements, Roots};
 use crate::synthesis::tissue::{Extent, TissueSource};
+use crate::synthesis::units::{Flow, Scale, ScaleError};
 use std::fmt;
 use std::str::FromStr;
 
@@ -37,6 +38,34 @@ pub struct Preset {
     ///
     /// Default: space colonization with the paper's settings.
     pub generator: Generator,
+    /// The blood of an organ of this kind. Default: unknown.
+    pub blood: Option<OrganBlood>,
+}
+
+/// The blood that flows through an organ, as measured, and the size at which it does.
+///
+/// A tree's own resistance lets through far more. `fit_bed` of a [network](crate::synthesis::haemodynamics::Network) or
+/// a [circulation](crate::synthesis::haemodynamics::Circulation) gives the bed the resistance for this flow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub struct OrganBlood {
+    /// Flow into all arterial roots together.
+    pub flow: Flow,
+    /// Equivalent diameter of the organ's tissue, in metres: of a disc with the area of its surface, or a ball with its
+    /// volume.
+    pub diameter: f64,
+}
+
+impl OrganBlood {
+    /// The scale at which a tissue has the size of the organ, in whatever unit its mesh is.
+    ///
+    /// # Errors
+    /// A tissue without size, or a diameter that isn't above 0.
+    pub fn scale(&self, extent: Extent) -> Result<Scale, ScaleError> {
+        Scale::from_metres(self.diameter / f64::from(extent.equivalent_diameter()))
+    }
 }
 
 impl Default for Preset {
@@ -48,6 +77,7 @@ impl Default for Preset {
             tissue: TissueSource::default(),
             roots: RootPlacements::default(),
             generator: Generator::default(),
+            blood: None,
         }
     }
 }

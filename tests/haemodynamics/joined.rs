@@ -2,9 +2,12 @@
 
 use super::trees::{drawn_tree, pieces, resisting, rng, wound};
 use bevy_vessels::synthesis::{
-    haemodynamics::{Circulation, EndSide, FlowError, Interruption, Network, RootPressure},
+    haemodynamics::{
+        Bleeding, BleedingSettings, BloodVolume, BloodVolumeSettings, Circulation, EndSide, FlowError, FlowSettings,
+        Interruption, Network, RootPressure,
+    },
     tree::{BedLink, NO_PARENT, NodeId, VesselTree},
-    units::Pressure,
+    units::{Pressure, Volume},
 };
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -18,6 +21,11 @@ struct Organ {
 
 /// Two random trees and links between them, half of them between any nodes.
 fn organ(rng: &mut ChaCha8Rng, nodes: usize, bed: f64) -> Organ {
+    organ_under(Pressure::ZERO, rng, nodes, bed)
+}
+
+/// The same, with this pressure around.
+fn organ_under(ambient: Pressure, rng: &mut ChaCha8Rng, nodes: usize, bed: f64) -> Organ {
     let trees = [drawn_tree(rng, nodes), drawn_tree(rng, nodes)];
     let node = |rng: &mut ChaCha8Rng, tree: &VesselTree| {
         let tips = tree.tips();
@@ -29,10 +37,10 @@ fn organ(rng: &mut ChaCha8Rng, nodes: usize, bed: f64) -> Organ {
     };
     let links: Vec<BedLink> =
         (0..nodes / 3).map(|_| BedLink { arterial: node(rng, &trees[0]), venous: node(rng, &trees[1]) }).collect();
-    let mut venous = resisting(bed);
-    venous.root = RootPressure::Constant(Pressure::from_mmhg(4.0));
+    let arterial = FlowSettings { ambient, ..resisting(bed) };
+    let venous = FlowSettings { root: RootPressure::Constant(Pressure::from_mmhg(4.0)), ..arterial };
     let networks = [
-        Network::new(&trees[0], resisting(bed)).expect("valid numbers"),
+        Network::new(&trees[0], arterial).expect("valid numbers"),
         Network::new(&trees[1], venous).expect("valid numbers"),
     ];
     let [arterial, venous] = networks;
@@ -302,4 +310,42 @@ fn a_bed_without_resistance_joins_nothing() {
         Circulation::new(network.clone(), network, &[link]).unwrap_err(),
         FlowError::NoSuchNode { node: 7, nodes: 3 }
     );
+}
+
+/// The flow that leaves all open ends of a circulation, in m³/s.
+fn bleeding_rate(circulation: &Circulation) -> f64 {
+    let ends = circulation.arterial().open_ends().iter().chain(circulation.venous().open_ends());
+    ends.map(|end| end.flow().cubic_metres_per_second()).sum()
+}
+
+/// However fast, a patient bleeds out and no further, and the solver sees it through to the end, when nothing flows.
+#[test]
+fn bleeding_out_is_solved_to_the_last_drop() -> Result<(), Box<dyn std::error::Error>> {
+    for seed in 0..60 {
+        let mut rng = rng(seed);
+        let suction = seed % 3 == 2;
+        let ambient = Pressure::from_mmhg(if suction { -100.0 } else { 0.0 });
+        let mut organ = organ_under(ambient, &mut rng, 80, 0.01);
+        wound(&mut rng, organ.circulation.arterial_mut(), &organ.trees[0], 4);
+        wound(&mut rng, organ.circulation.venous_mut(), &organ.trees[1], 4);
+        organ.circulation.solve()?;
+        let rate = bleeding_rate(&organ.circulation);
+        // From a hundred steps' worth of blood to a hundredth of one.
+        let total = Volume::from_cubic_metres((rate * 100.0 / 10.0_f64.powi(seed as i32 % 5)).max(1e-12));
+        let settings = BloodVolumeSettings { total, ..BloodVolumeSettings::default() };
+        let mut blood = BloodVolume::new(settings)?;
+        let never = BleedingSettings { clotting: None, longest_step: 1.0 };
+        let [mut arteries, mut veins] = [Bleeding::new(never)?, Bleeding::new(never)?];
+        for step in 0..200 {
+            let before = blood.lost_share();
+            Bleeding::step_joined([&mut arteries, &mut veins], &mut organ.circulation, 1.0, &mut blood)
+                .map_err(|error| format!("seed {seed}, step {step}, {before} lost: {error}"))?;
+            let lost = arteries.lost().cubic_metres() + veins.lost().cubic_metres();
+            assert!(lost <= total.cubic_metres() * (1.0 + 1e-9), "seed {seed}: {lost} of {total:?}");
+            assert!((blood.lost().cubic_metres() - lost).abs() <= 1e-9 * total.cubic_metres());
+        }
+        let share = blood.lost_share();
+        assert!(share <= 0.45 + 1.0 / 32.0 || suction, "seed {seed}: {share} lost without any pressure left");
+    }
+    Ok(())
 }

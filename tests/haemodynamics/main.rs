@@ -1,5 +1,6 @@
 //! Blood flow against laws, symmetric trees, a dense linear solver, and fresh solutions.
 
+mod demand;
 mod dense;
 mod incremental;
 mod joined;

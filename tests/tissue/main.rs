@@ -1,5 +1,6 @@
 //! Tissues against oracles: analytic moments, brute force, and meshes of known volume.
 
+mod awkward;
 mod fields;
 mod no_go;
 mod sources;

@@ -23,6 +23,15 @@ use bevy::{
 ///
 /// Flow is that of the organ at rest: neither its transform nor its deformation changes it.
 ///
+/// By default the vessels alone limit the flow, and let through many times what an organ takes: litres a minute in a
+/// colon. For a physiological flow, give the bed a resistance. A preset that knows its organ's
+/// [blood](crate::synthesis::preset::Preset::blood) gives the scale and the flow, and
+/// [`fit_bed`](crate::synthesis::haemodynamics::Network::fit_bed) the resistance for it.
+///
+/// Time is that of Bevy's generic clock. Its virtual time counts at most a quarter of a second of a frame, unless an app
+/// sets another `max_delta` of [`Time<Virtual>`](bevy::time::Virtual): in longer frames blood loses time, as all does that
+/// follows this clock.
+///
 /// ```
 /// # use bevy_vessels::{plugin::{Perfusion, Vasculature}, synthesis::{preset::PresetName, units::Scale}};
 /// let organ = (

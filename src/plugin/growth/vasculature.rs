@@ -69,7 +69,7 @@ impl Vasculature {
 
     /// The vessels of a preset, such as one read from a file, with seed 0, fitted to the organ.
     pub fn from_preset(preset: Preset) -> Self {
-        let Preset { version: _, source: _, fit, tissue, roots, generator } = preset;
+        let Preset { version: _, source: _, fit, tissue, roots, generator, blood: _ } = preset;
         Self { seed: 0, generator, roots, tissue, fit }
     }
 
@@ -106,7 +106,7 @@ impl Vasculature {
 impl From<&Vasculature> for Preset {
     fn from(vasculature: &Vasculature) -> Self {
         let Vasculature { seed: _, generator, roots, tissue, fit } = vasculature.clone();
-        Self { version: Self::VERSION, source: String::new(), fit, tissue, roots, generator }
+        Self { fit, tissue, roots, generator, ..Self::default() }
     }
 }
 

@@ -8,6 +8,9 @@ use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
 use crate::synthesis::{pace::Pace, parallel};
 use bevy_math::{Vec3, Vec3A};
 
+/// Share of the summed areas below which the sum of their normals is rounding.
+const CANCELLED_SHARE: f64 = 1.0e-5;
+
 /// Fewest triangles, vertices, or groups of four nodes, worth handing to another thread.
 pub(super) const WORTH_SHARING: usize = 2048;
 
@@ -79,7 +82,10 @@ impl Vertices {
         let normal = |_, &[from, to]: &[u32; 2]| {
             let areas = around[from as usize..to as usize].iter().map(|&triangle| areas[triangle as usize]);
             // In f64, where no square of an area vanishes.
-            Vec3A::from(unit(areas.sum::<Vec3A>().as_dvec3()))
+            let sum = areas.clone().sum::<Vec3A>().as_dvec3();
+            let weight: f64 = areas.map(|area| area.as_dvec3().length()).sum();
+            // What is left where areas cancel out is rounding.
+            if sum.length() > CANCELLED_SHARE * weight { Vec3A::from(unit(sum)) } else { Vec3A::ZERO }
         };
         parallel::map_all(&self.ranges, &mut self.normals, WORTH_SHARING, normal);
         let (welding, normals) = (&self.welding, &self.normals);
@@ -125,6 +131,20 @@ mod tests {
                 assert!((Vec3::from(vertex.normal) - expected).length() < 1.0e-6, "size {size}: {}", vertex.normal);
             }
         }
+    }
+
+    /// Sums of opposite areas are rounding, which is no direction.
+    #[test]
+    fn both_sides_of_a_sheet_leave_no_normal() {
+        let at = |k: u32| Vec3::new((k % 7) as f32 * 0.37, (k / 7) as f32 * 0.23, ((k * k) as f32 * 0.7).sin() * 0.1);
+        let positions: Vec<Vec3> = (0..49).map(at).collect();
+        let front = (0..36).map(|k| k + k / 6).flat_map(|k| [[k, k + 1, k + 7], [k + 1, k + 8, k + 7]]);
+        let triangles: Vec<[u32; 3]> = front.flat_map(|[a, b, c]| [[a, b, c], [c, b, a]]).collect();
+        let mesh = TriangleMesh::new(positions, triangles, None).expect("a mesh");
+        let mut vertices = Vec::new();
+        at_once(Vertices::new(&mesh, &Pace::default())).measure(mesh.positions(), &mut vertices);
+        assert!(vertices.iter().all(|vertex| vertex.normal == Vec3A::ZERO));
+        assert!(mesh.vertex_normals().iter().all(|normal| *normal == Vec3::ZERO));
     }
 
     #[test]

@@ -15,6 +15,14 @@ use bevy_math::{Vec3, bounding::Aabb3d};
 /// No node or drain.
 const NONE: u32 = u32::MAX;
 
+/// A place that attracts vessels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Attraction {
+    pub position: Vec3,
+    /// Normal of the facet of the tissue's surface that it lies on; zero without one.
+    pub side: Vec3,
+}
+
 /// A drain's knowledge of the vessels around it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hearing {
@@ -118,6 +126,7 @@ impl News {
 #[derive(Debug, Default)]
 pub(crate) struct Drains {
     grid: PointGrid,
+    sides: Vec<Vec3>,
     hearing: Vec<Hearing>,
     states: Vec<State>,
     /// First drain that waits at each node.
@@ -132,6 +141,7 @@ impl Drains {
     /// Removes all drains and covers a box with cells of a given side, keeping memory.
     pub fn reset(&mut self, bounds: &Aabb3d, cell: f32) {
         self.grid.reset(bounds, cell);
+        self.sides.clear();
         self.hearing.clear();
         self.states.clear();
         self.waiting.clear();
@@ -150,15 +160,17 @@ impl Drains {
     }
 
     /// Adds a drain that must search its node, and returns its slot.
-    pub fn add(&mut self, position: Vec3) -> u32 {
+    pub fn add(&mut self, Attraction { position, side }: Attraction) -> u32 {
         let slot = if let Some(slot) = self.free.pop() {
             self.grid.replace(slot, position);
             slot
         } else {
             self.hearing.push(Hearing::NOBODY);
             self.states.push(State::Gone);
+            self.sides.push(side);
             self.grid.push(position)
         };
+        self.sides[slot as usize] = side;
         self.hearing[slot as usize] = Hearing::NOBODY;
         self.states[slot as usize] = State::Searching;
         self.awake.push(slot);
@@ -177,6 +189,19 @@ impl Drains {
     /// Position of a drain.
     pub fn position(&self, slot: u32) -> Vec3 {
         self.grid.point(slot)
+    }
+
+    /// A drain as an attraction point.
+    pub fn attraction(&self, slot: u32) -> Attraction {
+        Attraction { position: self.position(slot), side: self.sides[slot as usize] }
+    }
+
+    /// Turns every drain to the side that `side` gives for its position, and lets it search again.
+    pub fn turn(&mut self, side: impl Fn(Vec3) -> Vec3) {
+        for (slot, own) in self.sides.iter_mut().enumerate().filter(|&(slot, _)| self.states[slot] != State::Gone) {
+            *own = side(self.grid.point(slot as u32));
+        }
+        self.wake_all();
     }
 
     /// Slots and positions of all living drains, in the order of their slots.
@@ -268,15 +293,17 @@ impl Drains {
         }
     }
 
-    /// Notifies a drain of a new open node with a segment in the given `direction`. Of two nodes at equal distance, the
-    /// older stays.
-    pub fn hear(&mut self, heard: Heard, position: Vec3, direction: Vec3) {
+    /// Notifies a drain of a new open node. `cos` gives the cosine of the angle between the node's direction and that in
+    /// which it sees a drain, if it does. Of two nodes at equal distance, the older stays.
+    pub fn hear(&mut self, heard: Heard, cos: impl Fn(Attraction) -> Option<f32>) {
         let Heard { node, drain: slot, distance } = heard;
+        let drain = self.attraction(slot);
         let own = &mut self.hearing[slot as usize];
         own.closest = own.closest.min(distance);
-        if distance < own.distance {
+        if distance < own.distance
+            && let Some(cos) = cos(drain)
+        {
             self.detach(slot);
-            let cos = cos_at(direction, position, self.grid.point(slot));
             self.attach(slot, node, distance, cos);
             let state = &mut self.states[slot as usize];
             if *state == State::Asleep {
@@ -315,12 +342,4 @@ impl Drains {
         }
         self.hearing[slot as usize].node = NONE;
     }
-}
-
-/// The cosine of a drain on the node itself, which counts as in front of it.
-pub(crate) const ON_THE_NODE: f32 = 2.0;
-
-/// Cosine of the angle between a direction and the direction from a node to a drain.
-pub(crate) fn cos_at(direction: Vec3, node: Vec3, drain: Vec3) -> f32 {
-    (drain - node).try_normalize().map_or(ON_THE_NODE, |toward| direction.dot(toward).clamp(-1.0, 1.0))
 }

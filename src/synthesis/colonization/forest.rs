@@ -1,7 +1,8 @@
 //! The forest of one system while it grows: the tree, with further data of each node for growth.
 
+use super::drains::Attraction;
 use crate::synthesis::space::point_grid::PointGrid;
-use crate::synthesis::tissue::TissuePoint;
+use crate::synthesis::tissue::{Facet, Tissue, TissuePoint};
 use crate::synthesis::tree::murray;
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
 use bevy_math::{Vec3, bounding::Aabb3d, ops};
@@ -18,6 +19,8 @@ pub(crate) struct Forest {
     pub directions: Vec<Vec3>,
     /// Normal of the tissue's surface, zero in a volume.
     pub normals: Vec<Vec3>,
+    /// The facet of the tissue's surface that the node lies on.
+    facets: Vec<Option<Facet>>,
     /// Step in which the node was born, 0 for initial nodes.
     pub birth_steps: Vec<u32>,
     kin: Vec<Kin>,
@@ -43,6 +46,25 @@ struct Kin {
     next_sibling: u32,
 }
 
+/// The cosine of a drain on the node itself, which counts as in front of it.
+pub(crate) const ON_THE_NODE: f32 = 2.0;
+
+/// Cosine of the angle between a direction and the direction from a node to a drain.
+fn cos_at(direction: Vec3, node: Vec3, drain: Vec3) -> f32 {
+    (drain - node).try_normalize().map_or(ON_THE_NODE, |toward| direction.dot(toward).clamp(-1.0, 1.0))
+}
+
+/// Cosine of the angle between two facets from which each lies on the other side of a wall.
+const AVERTED: f32 = -0.5;
+
+/// Cosine of the angle between two facets from which one lies round an edge from the other.
+const ROUND: f32 = 0.5;
+/// Share of the squared way to a point from which it counts as off a facet: a little more than that of a ball.
+const RAISED: f32 = 0.02;
+
+/// Share of the squared way to a drain that must be along a facet.
+const STEEP: f32 = 1e-6;
+
 /// No child.
 const NONE: u32 = u32::MAX;
 
@@ -60,6 +82,7 @@ impl Forest {
         self.tree.clear();
         self.directions.clear();
         self.normals.clear();
+        self.facets.clear();
         self.birth_steps.clear();
         self.kin.clear();
         self.fanouts.clear();
@@ -101,13 +124,13 @@ impl Forest {
         self.add_child(parent, at, radius, self.sum_of(radius), 0);
     }
 
-    /// Adds a tip to a node. The next [`sum_up`](Self::sum_up) updates the sums towards the root.
-    pub fn add_tip(&mut self, parent: u32, at: TissuePoint, step: u32) {
+    /// Adds a tip to a node, and returns it. The next [`sum_up`](Self::sum_up) updates the sums towards the root.
+    pub fn add_tip(&mut self, parent: u32, at: TissuePoint, step: u32) -> u32 {
         let (radius, sum) = self.tip;
-        self.add_child(parent, at, radius, sum, step);
+        self.add_child(parent, at, radius, sum, step)
     }
 
-    fn add_child(&mut self, parent: u32, at: TissuePoint, radius: f32, sum: f32, step: u32) {
+    fn add_child(&mut self, parent: u32, at: TissuePoint, radius: f32, sum: f32, step: u32) -> u32 {
         let above = parent as usize;
         let direction = (at.position - self.tree.positions()[above]).normalize_or_zero();
         let id = self.tree.push_child(NodeId(parent), at.position, radius).0;
@@ -119,15 +142,70 @@ impl Forest {
         self.fanouts.push(Fanout::default());
         self.kin[id as usize].next_sibling = std::mem::replace(&mut self.kin[above].first_child, id);
         self.unsummed.insert(parent);
+        id
     }
 
     fn add_channels(&mut self, at: TissuePoint, direction: Vec3, sum: f32, step: u32) {
         self.directions.push(direction);
         self.normals.push(at.normal);
+        self.facets.push(at.facet);
         self.birth_steps.push(step);
         self.unsettled.insert(self.kin.len() as u32);
         self.kin.push(Kin { sum, first_child: NONE, next_sibling: NONE });
         self.index.push(at.position);
+    }
+
+    /// A node as a point of the tissue.
+    pub fn point(&self, node: u32) -> TissuePoint {
+        let node = node as usize;
+        TissuePoint { position: self.tree.positions()[node], normal: self.normals[node], facet: self.facets[node] }
+    }
+
+    /// Finds the facets of all nodes anew, on another tissue.
+    pub fn stand_on(&mut self, tissue: &dyn Tissue) {
+        for (&position, own) in self.tree.positions().iter().zip(&mut self.facets) {
+            *own = if tissue.has_facets() { tissue.point_at(position).facet } else { None };
+        }
+    }
+
+    /// Where a node sees a drain: on a surface as far away as it is, in the direction along the node's facet.
+    pub fn sight(&self, node: u32, drain: Vec3) -> Vec3 {
+        let Some(facet) = self.facets[node as usize] else { return drain };
+        let position = self.tree.positions()[node as usize];
+        let way = drain - position;
+        let along = way - facet.normal * way.dot(facet.normal);
+        let square = along.length_squared();
+        // One that is straight above or below is in no direction along the facet.
+        if square > STEEP * way.length_squared() { position + along * (way.length() / square.sqrt()) } else { drain }
+    }
+
+    /// Whether a node sees a drain on a side of the tissue's surface, of which the normal is given: not if it lies behind,
+    /// on the other side of a wall.
+    pub fn sees(&self, node: u32, side: Vec3) -> bool {
+        self.facets[node as usize].is_none_or(|facet| facet.normal.dot(side) > AVERTED)
+    }
+
+    /// Whether a node supplies a side of the tissue's surface near it: not round a sharp edge, so that vessels are drawn
+    /// round it, and not through a wall.
+    pub fn supplies(&self, node: u32, side: Vec3) -> bool {
+        self.facets[node as usize].is_none_or(|facet| facet.normal.dot(side) > ROUND)
+    }
+
+    /// Whether a point lies so far above or below a node's facet that it may be round an edge, or on the other side of a
+    /// wall.
+    pub fn is_steep(&self, node: u32, point: Vec3) -> bool {
+        let way = point - self.tree.positions()[node as usize];
+        self.facets[node as usize].is_some_and(|facet| {
+            let height = way.dot(facet.normal);
+            height * height > RAISED * way.length_squared()
+        })
+    }
+
+    /// Cosine of the angle between a node's direction and that in which it sees a drain; `None` if it doesn't see it.
+    pub fn cos_to(&self, node: u32, drain: Attraction) -> Option<f32> {
+        let index = node as usize;
+        let cos = || cos_at(self.directions[index], self.tree.positions()[index], self.sight(node, drain.position));
+        self.sees(node, drain.side).then(cos)
     }
 
     /// r^κ of a radius in units of the terminal one.
@@ -241,7 +319,7 @@ mod tests {
     use super::*;
 
     fn at(x: f32) -> TissuePoint {
-        TissuePoint { position: Vec3::X * x, normal: Vec3::ZERO }
+        TissuePoint::new(Vec3::X * x, Vec3::ZERO)
     }
 
     #[test]

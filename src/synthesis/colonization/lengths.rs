@@ -59,6 +59,12 @@ impl Lengths {
         self.influence.max(self.kill)
     }
 
+    /// Distance from the tissue's surface within which a segment stays: half its radius, but not so little that a step
+    /// would take many segments, nor so much that they wouldn't follow the surface.
+    pub fn bend_tolerance(&self) -> f32 {
+        (0.5 * self.terminal_radius).clamp(self.step / 256.0, self.step / 16.0)
+    }
+
     /// Side of the cells of the index over nodes: a little more than the most frequent query distance. Empty cells cost
     /// nothing, and a cell of this size has about one node.
     pub fn node_cell(&self) -> f32 {

@@ -51,6 +51,21 @@ pub enum ColonizationError {
     /// The arteries have no root, and the veins follow the arteries.
     #[error("the arterial system has no root; place at least one, or give it a tree to grow from")]
     NoArterialRoot,
+    /// A given tree with a radius that no vessel with the settings' terminals can have.
+    #[error(
+        "node {node} of the given {} tree has a radius of {radius}, and terminals have {terminal}; it must be \
+        1e-6 to 1e6 times that: scale the tree or the terminal radius", kind.name()
+    )]
+    GivenRadius {
+        /// The kind of the tree.
+        kind: VesselKind,
+        /// The first such node.
+        node: usize,
+        /// Its radius.
+        radius: f32,
+        /// The terminal radius of the settings.
+        terminal: f32,
+    },
 }
 
 /// A colonization under way.
@@ -140,6 +155,9 @@ impl Colonization {
         seed: u64,
     ) -> Result<ByKind<Vec<TissuePoint>>, ColonizationError> {
         let placed = roots.resolve(tissue, &settings.root_spacing(), seed)?;
+        for (kind, system) in settings.systems() {
+            check_radii(kind, system, roots.given[kind].as_ref())?;
+        }
         let given = roots.given.artery.as_ref().is_some_and(|tree| !tree.is_empty());
         if placed.artery.is_empty() && !given { Err(ColonizationError::NoArterialRoot) } else { Ok(placed) }
     }
@@ -319,6 +337,19 @@ impl Colonization {
 
     fn system(&self, kind: VesselKind) -> Option<&SystemGrowth> {
         Self::KINDS.iter().position(|&grown| grown == kind).map(|index| &self.systems[index])
+    }
+}
+
+/// Most that a given radius may differ from that of a terminal, as a factor: powers of it stay within f32.
+const MOST_RADII: f32 = 1e6;
+
+fn check_radii(kind: VesselKind, system: &SystemSettings, given: Option<&VesselTree>) -> Result<(), ColonizationError> {
+    let terminal = system.terminal_radius;
+    let fits = |radius: f32| (MOST_RADII.recip()..=MOST_RADII).contains(&(radius / terminal));
+    let radii = given.map_or(&[][..], VesselTree::radii);
+    match radii.iter().position(|&radius| !fits(radius)) {
+        Some(node) => Err(ColonizationError::GivenRadius { kind, node, radius: radii[node], terminal }),
+        None => Ok(()),
     }
 }
 

@@ -1,10 +1,10 @@
 //! Which node perceives a drain: open nodes, their perception volumes, and the drains of each node.
 
-use super::drains::{Drains, Found, ON_THE_NODE, cos_at};
-use super::forest::Forest;
+use super::drains::{Attraction, Drains, Found};
+use super::forest::{Forest, ON_THE_NODE};
 use super::lengths::Lengths;
 use crate::synthesis::parallel;
-use bevy_math::{Vec3, ops};
+use bevy_math::ops;
 
 /// A drain that acts on a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -25,8 +25,8 @@ pub(crate) fn is_open(forest: &Forest, lengths: &Lengths, node: u32) -> bool {
 
 /// Finds the drains that act in this step, sorted by node.
 ///
-/// A drain acts on its nearest open node within the influence distance, if it lies in that node's perception volume; if
-/// not, it waits. `nearest open node` is exact: of two at equal distance, the older wins. Only drains with a change
+/// A drain acts on the nearest open node within the influence distance that sees it, if it lies in that node's perception
+/// volume; if not, it waits. `nearest open node` is exact: of two at equal distance, the older wins. Only drains with a change
 /// nearby, and those that acted in the step before, are tested.
 pub(crate) fn associate(
     forest: &Forest,
@@ -66,7 +66,7 @@ impl Search {
         self.asking.clear();
         self.asking.extend(drains.awake().iter().filter(|&&drain| drains.is_searching(drain)));
         let shared = &*drains;
-        let find = |&drain: &u32| nearest_open(forest, lengths, shared.position(drain));
+        let find = |&drain: &u32| nearest_open(forest, lengths, shared.attraction(drain));
         parallel::map_into(&self.asking, &mut self.found, Found::default(), find);
         for (&drain, &found) in self.asking.iter().zip(&self.found) {
             drains.settle(drain, found);
@@ -74,17 +74,16 @@ impl Search {
     }
 }
 
-/// The nearest open node within the influence distance, and the distance to the nearest node of any kind.
-fn nearest_open(forest: &Forest, lengths: &Lengths, center: Vec3) -> Found {
-    let (nearest, closest) =
-        forest.index().nearest_two(center, lengths.reach(), lengths.influence, |node| is_open(forest, lengths, node));
-    let mut found = Found { closest, ..Found::default() };
-    if let Some((node, distance)) = nearest {
-        let index = node as usize;
-        let cos = cos_at(forest.directions[index], forest.tree.positions()[index], center);
-        found = Found { node: Some(node), distance, cos, ..found };
-    }
-    found
+/// The nearest open node within the influence distance that sees a drain, and the distance to the nearest node of any
+/// kind.
+fn nearest_open(forest: &Forest, lengths: &Lengths, drain: Attraction) -> Found {
+    let accepts = |node| is_open(forest, lengths, node) && forest.sees(node, drain.side);
+    let (nearest, closest) = forest.index().nearest_two(drain.position, lengths.reach(), lengths.influence, accepts);
+    let found = nearest.and_then(|(node, distance)| {
+        let cos = forest.cos_to(node, drain)?;
+        Some(Found { node: Some(node), distance, cos, closest })
+    });
+    found.unwrap_or(Found { closest, ..Found::default() })
 }
 
 /// The angle of the sprout beside a node's child, kept for the next drain of the same node.
@@ -129,8 +128,7 @@ pub(super) fn assert_none_sleeps_in(forest: &Forest, lengths: &Lengths, drains: 
     let asked = drains.slots().filter_map(|drain| {
         let hearing = drains.hearing(drain);
         let node = hearing.node().filter(|_| hearing.distance <= reach)?;
-        let (position, direction) = (forest.tree.positions()[node as usize], forest.directions[node as usize]);
-        let cos = cos_at(direction, position, drains.position(drain));
+        let cos = forest.cos_to(node, drains.attraction(drain))?;
         perceives(forest, lengths, node, cos, &mut SproutAngle::default()).then_some(Pull { node, drain })
     });
     let mut expected: Vec<Pull> = asked.collect();

@@ -6,6 +6,8 @@
 
 pub use super::validity::{SettingsError, SettingsWarning};
 
+#[cfg(doc)]
+use crate::synthesis::mesh::MAX_COORDINATE;
 use crate::synthesis::roots::RootSpacing;
 use crate::synthesis::tissue::{Extent, TissueGrowth};
 use crate::synthesis::tree::{ByKind, VesselKind};
@@ -41,26 +43,26 @@ pub struct SystemSettings {
     ///
     /// Higher values give fewer drains and a coarser tree. Drains handed to the venous system are not tested again.
     ///
-    /// Units: tissue lengths. Limits: ≥ 0. Default: [`Self::DEFAULT_DRAIN_BIRTH_DISTANCE`].
+    /// Units: tissue lengths. Limits: 0 to [`MAX_COORDINATE`]. Default: [`Self::DEFAULT_DRAIN_BIRTH_DISTANCE`].
     pub drain_birth_distance: f32,
     /// Least distance between a new drain and the nodes of the tree: tissue closer than this is supplied.
     ///
     /// Higher values leave more room between vessels.
     ///
-    /// Units: tissue lengths. Limits: ≥ 0. Default: [`Self::DEFAULT_NODE_BIRTH_DISTANCE`].
+    /// Units: tissue lengths. Limits: 0 to [`MAX_COORDINATE`]. Default: [`Self::DEFAULT_NODE_BIRTH_DISTANCE`].
     pub node_birth_distance: f32,
     /// Distance δ within which a drain acts on its nearest node (Eq. 2 and 3).
     ///
     /// Higher values let vessels react to distant drains with fewer, smoother turns; lower values leave drains without
     /// effect.
     ///
-    /// Units: tissue lengths. Limits: > 0. Default: [`Self::DEFAULT_INFLUENCE_DISTANCE`].
+    /// Units: tissue lengths. Limits: > 0, at most [`MAX_COORDINATE`]. Default: [`Self::DEFAULT_INFLUENCE_DISTANCE`].
     pub influence_distance: f32,
     /// Distance at which a drain that has acted counts as supplied and is removed.
     ///
     /// Lower values let terminals come closer to the tissue they feed, and take more steps.
     ///
-    /// Units: tissue lengths. Limits: > 0. Default: [`Self::DEFAULT_KILL_DISTANCE`].
+    /// Units: tissue lengths. Limits: > 0, at most [`MAX_COORDINATE`]. Default: [`Self::DEFAULT_KILL_DISTANCE`].
     pub kill_distance: f32,
     /// Full opening angle γ of a node's perception volume (Eq. 2 and 3).
     ///
@@ -72,7 +74,7 @@ pub struct SystemSettings {
     ///
     /// All other radii follow from it by Murray's law, so it scales the thickness of the whole tree.
     ///
-    /// Units: tissue lengths. Limits: > 0. Default: [`Self::DEFAULT_TERMINAL_RADIUS`].
+    /// Units: tissue lengths. Limits: > 0, at most [`MAX_COORDINATE`]. Default: [`Self::DEFAULT_TERMINAL_RADIUS`].
     pub terminal_radius: f32,
     /// Whether the terminal radius shrinks with λ_t like all other lengths, as in the paper's text. The paper's own
     /// program keeps it constant.
@@ -83,7 +85,7 @@ pub struct SystemSettings {
     ///
     /// Lower values give smoother vessels and more nodes. Above the kill distance vessels overshoot their drains.
     ///
-    /// Units: tissue lengths. Limits: > 0. Default: [`Self::DEFAULT_STEP_LENGTH`].
+    /// Units: tissue lengths. Limits: > 0, at most [`MAX_COORDINATE`]. Default: [`Self::DEFAULT_STEP_LENGTH`].
     pub step_length: f32,
     /// Spread φ of the angles to its drains from which a tip bifurcates symmetrically.
     ///
@@ -211,8 +213,10 @@ pub struct ColonizationSettings {
     pub arterial: SystemSettings,
     /// Settings of the veins.
     pub venous: SystemSettings,
-    /// Whether a node that leaves the tissue is brought back to the tissue's nearest point: onto a surface, or into a
-    /// volume. The paper's own vessels leave it.
+    /// Whether vessels keep to the tissue. On a mesh's surface they run straight along it and bend where it does, with a
+    /// node at each bend, so that no segment leads more than half a terminal radius away from it (but at least 1/256 and at
+    /// most 1/16 of a step); they are drawn to tissue on their own side of it, in the directions along it. In other
+    /// tissues, a node that leaves the tissue is brought back to its nearest point. The paper's own vessels leave it.
     ///
     /// Default: true.
     pub confine: bool,

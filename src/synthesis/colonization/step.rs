@@ -29,11 +29,13 @@ impl<'a> Step<'a> {
     ) {
         // A staged tissue changes from stage to stage, and has no pieces of its own.
         if self.tissue.stage(1).is_none() {
-            let (nodes, drains) = (arteries.forest.tree.positions(), arteries.drains.living());
+            let (forest, drains) = (&arteries.forest, arteries.drains.living());
+            let nodes = (forest.tree.positions(), |node, side| forest.supplies(node, side));
             vacancy.prepare(self.tissue, arteries.length_scale(), nodes, drains);
         }
         self.draw(draws, vacancy.chosen());
-        candidates.take(draws, &self.tissue.bounds(), |some, refused| arteries.refuse(some, refused));
+        let ground = self.ground();
+        candidates.take(draws, &self.tissue.bounds(), |some, refused| arteries.refuse(some, ground, refused));
     }
 
     /// Draws candidates, unless it has been done before.
@@ -49,15 +51,16 @@ impl<'a> Step<'a> {
         candidates: &Candidates,
         vacancy: &mut Vacancy,
     ) -> (u32, SystemReport) {
+        self.enter_stage(arteries);
         let mut born = 0;
         for candidate in candidates.iter() {
-            if let Some(drain) = arteries.offer_drain(candidate) {
+            if let Some(drain) = arteries.offer_drain(candidate, self.ground()) {
                 vacancy.add_drain(drain, candidate);
                 born += 1;
             }
         }
         let report = arteries.grow(self.ground(), self.number);
-        arteries.supplied().iter().for_each(|supplied| vacancy.remove_drain(supplied.drain, supplied.position));
+        arteries.supplied().iter().for_each(|supplied| vacancy.remove_drain(supplied.drain, supplied.at.position));
         arteries.advance_tissue(self.number);
         (born, report)
     }
@@ -66,12 +69,21 @@ impl<'a> Step<'a> {
     pub fn grow_veins(self, veins: &mut SystemGrowth, supplied: &[Supplied], links: &mut Vec<BedLink>) -> SystemReport {
         let mut report = SystemReport::default();
         if !veins.forest.tree.is_empty() {
+            self.enter_stage(veins);
             veins.receive(supplied);
             report = veins.grow(self.ground(), self.number);
             links.extend(veins.links());
         }
         veins.advance_tissue(self.number);
         report
+    }
+
+    /// If another tissue is in force from this step on, lets a system take it up.
+    fn enter_stage(self, system: &mut SystemGrowth) {
+        let before = self.tissue.at_step(self.number.saturating_sub(1).max(1));
+        if !std::ptr::addr_eq(before, self.tissue.at_step(self.number)) {
+            system.stand_on(self.ground());
+        }
     }
 
     /// The tissue and rules for placing new nodes.

@@ -1,7 +1,7 @@
 //! One growth step of one system: associate, grow, kill (Rauch & Harders 2021, section 3).
 
 use super::direction::{Decision, decide};
-use super::drains::{Drains, News};
+use super::drains::{Attraction, Drains, News};
 use super::forest::Forest;
 use super::lengths::Lengths;
 use super::perception::{self, Pull, Search};
@@ -29,20 +29,53 @@ pub(crate) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// Place of the end of a new segment; `None` if its middle or end is forbidden.
-    fn place(&self, from: Vec3, to: Vec3) -> Option<TissuePoint> {
-        let end = self.confined(to);
-        let forbidden = |point| self.no_go.is_some_and(|no_go| no_go.forbids(point));
-        (!forbidden(end.position) && !forbidden(from.midpoint(end.position))).then_some(end)
+    /// Where a vessel comes to that grows from a point by a step; `None` if there is no way, or the middle or end of one
+    /// of its segments is forbidden.
+    fn place(&self, from: &TissuePoint, direction: Vec3, lengths: &Lengths) -> Option<Tip> {
+        let forbids = |point| self.no_go.is_some_and(|no_go| no_go.forbids(point));
+        let (mut end, mut bends, mut forbidden, mut before) = (None, 0, false, from.position);
+        self.walk(from, direction, lengths, &mut |place| {
+            forbidden |= forbids(place.position) || forbids(before.midpoint(place.position));
+            bends += u32::from(end.replace(place).is_some());
+            before = place.position;
+        });
+        let tip = end.map(|end| Tip { end, bend: (bends > 0).then_some(direction) });
+        tip.filter(|_| !forbidden)
     }
 
-    fn confined(&self, position: Vec3) -> TissuePoint {
+    /// Calls `arrive` for the end of each segment of a step.
+    fn walk(&self, from: &TissuePoint, direction: Vec3, lengths: &Lengths, arrive: &mut dyn FnMut(TissuePoint)) {
         if self.confine {
-            return self.tissue.closest_point(position);
+            return self.tissue.walk(from, direction, lengths.step, lengths.bend_tolerance(), arrive);
         }
+        let position = from.position + direction * lengths.step;
         let normal = if self.normals { self.tissue.closest_point(position).normal } else { Vec3::ZERO };
-        TissuePoint { position, normal }
+        arrive(TissuePoint::new(position, normal));
     }
+
+    /// Whether vessels keep to one side of a surface.
+    fn has_sides(&self) -> bool {
+        self.confine && self.tissue.has_facets()
+    }
+
+    /// Normal of the facet at a place of the tissue, zero without one.
+    fn side(&self, position: Vec3) -> Vec3 {
+        let facet = if self.has_sides() { self.tissue.closest_point(position).facet } else { None };
+        facet.map_or(Vec3::ZERO, |facet| facet.normal)
+    }
+
+    /// A point as the start of vessels that may leave the tissue, or may not.
+    fn start(&self, at: TissuePoint) -> TissuePoint {
+        TissuePoint { facet: at.facet.filter(|_| self.confine), ..at }
+    }
+}
+
+/// The end of a step.
+#[derive(Clone, Copy, Debug)]
+struct Tip {
+    end: TissuePoint,
+    /// The direction of a way that bends before its end.
+    bend: Option<Vec3>,
 }
 
 /// A drain that a vessel has supplied.
@@ -50,17 +83,17 @@ impl Ground<'_> {
 pub(crate) struct Supplied {
     /// Its old slot.
     pub drain: u32,
-    /// Its position.
-    pub position: Vec3,
+    /// Its place.
+    pub at: Attraction,
     /// The node that supplied it: its nearest open one.
     pub node: u32,
 }
 
-/// A growing node, and the ends of its new segments, at most two.
+/// A growing node, and the ends of its steps, at most two.
 #[derive(Clone, Copy, Debug, Default)]
 struct Growing {
     node: u32,
-    tips: [Option<TissuePoint>; 2],
+    tips: [Option<Tip>; 2],
 }
 
 /// The forest and the drains of one system, with the lengths in force.
@@ -77,6 +110,8 @@ pub(crate) struct SystemGrowth {
     /// Ranges of pulls on the same node, and the growth of that node.
     pulled: Vec<Range<usize>>,
     growing: Vec<Growing>,
+    /// The places of a way that bends.
+    way: Vec<TissuePoint>,
     news: News,
     /// Drains supplied in the last step.
     supplied: Vec<Supplied>,
@@ -103,6 +138,7 @@ impl SystemGrowth {
             pulls: Vec::new(),
             pulled: Vec::new(),
             growing: Vec::new(),
+            way: Vec::new(),
             news: News::default(),
             supplied: Vec::new(),
             givers: Vec::new(),
@@ -125,13 +161,13 @@ impl SystemGrowth {
     /// Adds roots, and given trees.
     pub fn plant(&mut self, roots: &[TissuePoint], given: Option<&VesselTree>, ground: Ground<'_>) {
         for &root in roots {
-            self.forest.add_root(root, self.settings.terminal_radius);
+            self.forest.add_root(ground.start(root), self.settings.terminal_radius);
         }
         let first = self.forest.tree.len() as u32;
         if let Some(tree) = given {
             for (node, &parent) in tree.parents().iter().enumerate() {
                 let (position, radius) = (tree.positions()[node], tree.radii()[node]);
-                let at = TissuePoint { position, normal: ground.tissue.closest_point(position).normal };
+                let at = ground.start(ground.tissue.point_at(position));
                 match parent {
                     NO_PARENT => self.forest.add_root(at, radius),
                     parent => self.forest.add_given(first + parent, at, radius),
@@ -144,27 +180,44 @@ impl SystemGrowth {
 
     /// Marks candidates that cannot become drains: those in supplied tissue, within the birth distance of a node, or too near
     /// a drain.
-    pub fn refuse(&self, candidates: &[Vec3], refused: &mut [bool]) {
+    pub fn refuse(&self, candidates: &[Vec3], ground: Ground<'_>, refused: &mut [bool]) {
         let (nodes, drains) = (self.forest.index(), self.drains.index());
         let Lengths { node_birth, drain_birth, .. } = self.lengths;
         // Quick tests first.
         drains.mark_beside(candidates, drain_birth, refused);
-        nodes.mark_beside(candidates, node_birth, refused);
+        let has_sides = ground.has_sides();
+        if !has_sides {
+            nodes.mark_beside(candidates, node_birth, refused);
+        }
         for (&candidate, refused) in candidates.iter().zip(refused).filter(|(_, refused)| !**refused) {
-            *refused = drains.any_within(candidate, drain_birth) || nodes.any_within(candidate, node_birth);
+            *refused = drains.any_within(candidate, drain_birth)
+                || nodes.any_within(candidate, node_birth) && (!has_sides || self.supplies(candidate, ground));
+        }
+    }
+
+    /// Whether a node within the birth distance of a place is on the same side of the surface.
+    fn supplies(&self, place: Vec3, ground: Ground<'_>) -> bool {
+        let (forest, reach) = (&self.forest, self.lengths.node_birth);
+        let mut beside = false;
+        forest.index().for_each_within(place, reach, |node, _| beside |= !forest.is_steep(node, place));
+        // A search for the side of the place is seldom needed.
+        beside || {
+            let (side, mut seen) = (ground.side(place), false);
+            forest.index().for_each_within(place, reach, |node, _| seen |= forest.supplies(node, side));
+            seen
         }
     }
 
     /// Makes a candidate that has not been refused a drain, unless one has been born too near it meanwhile.
-    pub fn offer_drain(&mut self, candidate: Vec3) -> Option<u32> {
+    pub fn offer_drain(&mut self, candidate: Vec3, ground: Ground<'_>) -> Option<u32> {
         let room = !self.drains.index().any_within(candidate, self.lengths.drain_birth);
-        room.then(|| self.drains.add(candidate))
+        room.then(|| self.drains.add(Attraction { position: candidate, side: ground.side(candidate) }))
     }
 
     /// Takes drains that the other system has supplied.
     pub fn receive(&mut self, supplied: &[Supplied]) {
         for supplied in supplied {
-            let slot = self.drains.add(supplied.position) as usize;
+            let slot = self.drains.add(supplied.at) as usize;
             if slot == self.givers.len() {
                 self.givers.push(supplied.node);
             } else {
@@ -190,7 +243,7 @@ impl SystemGrowth {
         self.forest.set_tip_radius(self.lengths.terminal_radius);
         perception::associate(&self.forest, &self.lengths, &mut self.drains, &mut self.search, &mut self.pulls);
         self.decide(ground);
-        self.extend(step);
+        self.extend(ground, step);
         self.spread_news(first_new);
         self.kill();
         SystemReport {
@@ -212,9 +265,9 @@ impl SystemGrowth {
         parallel::map_into(pulled, growing, Growing::default(), |range| {
             let pulls = &pulls[range.clone()];
             let node = pulls[0].node;
-            let position = forest.tree.positions()[node as usize];
-            let place = |direction: Vec3| ground.place(position, position + direction * lengths.step);
-            let drains = pulls.iter().map(|pull| drains.position(pull.drain));
+            let at = forest.point(node);
+            let place = |direction: Vec3| ground.place(&at, direction, lengths);
+            let drains = pulls.iter().map(|pull| forest.sight(node, drains.position(pull.drain)));
             let tips = match decide(forest, lengths, node, drains) {
                 Decision::Extend(direction) => [place(direction), None],
                 Decision::Bifurcate(directions) => directions.map(place),
@@ -225,16 +278,34 @@ impl SystemGrowth {
     }
 
     /// Adds the decided segments, except those that would end on another node or at no place.
-    fn extend(&mut self, step: u32) {
-        let Self { forest, lengths, growing, .. } = self;
+    fn extend(&mut self, ground: Ground<'_>, step: u32) {
+        let Self { forest, lengths, growing, way, .. } = self;
         for growing in growing {
-            for &tip in growing.tips.iter().flatten() {
-                let free = tip.position.is_finite()
-                    && !forest.index().any_within(tip.position, LEAST_SEPARATION * lengths.step);
-                if free {
-                    forest.add_tip(growing.node, tip, step);
+            for &Tip { end, bend } in growing.tips.iter().flatten() {
+                way.clear();
+                match bend {
+                    None => way.push(end),
+                    Some(direction) => {
+                        ground.walk(&forest.point(growing.node), direction, lengths, &mut |place| way.push(place));
+                    }
+                }
+                let is_free = |place: &TissuePoint| {
+                    place.position.is_finite()
+                        && !forest.index().any_within(place.position, LEAST_SEPARATION * lengths.step)
+                };
+                if way.iter().all(is_free) {
+                    let mut node = growing.node;
+                    way.iter().for_each(|&place| node = forest.add_tip(node, place, step));
                 }
             }
+        }
+    }
+
+    /// Takes up another tissue, on which drains are seen in other directions.
+    pub fn stand_on(&mut self, ground: Ground<'_>) {
+        if ground.confine {
+            self.forest.stand_on(ground.tissue);
+            self.drains.turn(|position| ground.side(position));
         }
     }
 
@@ -249,7 +320,8 @@ impl SystemGrowth {
         forest.sum_up(|node| drains.wake(node, false));
         news.spread(drains, first_new, &forest.tree.positions()[first_new as usize..], lengths.reach());
         for heard in news.iter() {
-            drains.hear(heard, forest.tree.positions()[heard.node as usize], forest.directions[heard.node as usize]);
+            let is_open = perception::is_open(forest, lengths, heard.node);
+            drains.hear(heard, |drain| forest.cos_to(heard.node, drain).filter(|_| is_open));
         }
     }
 
@@ -259,8 +331,8 @@ impl SystemGrowth {
         let reach = self.lengths.kill * self.lengths.kill;
         for &Pull { drain, node } in &self.pulls {
             if self.drains.hearing(drain).closest <= reach {
-                let (position, node) = (self.drains.position(drain), self.drains.hearing(drain).node().unwrap_or(node));
-                self.supplied.push(Supplied { drain, position, node });
+                let (at, node) = (self.drains.attraction(drain), self.drains.hearing(drain).node().unwrap_or(node));
+                self.supplied.push(Supplied { drain, at, node });
                 self.drains.remove(drain);
             }
         }
@@ -306,6 +378,7 @@ impl SystemGrowth {
             let at = self.drains.position(drain);
             let nearest = (0..positions.len() as u32)
                 .filter(|&node| perception::is_open(&self.forest, &self.lengths, node))
+                .filter(|&node| self.forest.sees(node, self.drains.attraction(drain).side))
                 .map(|node| (positions[node as usize].distance_squared(at), node))
                 .filter(|&(distance, _)| distance <= reach)
                 .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

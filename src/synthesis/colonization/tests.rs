@@ -116,7 +116,9 @@ fn pulled_by(drains: &[Vec3], change: impl Fn(&mut ColonizationSettings)) -> Col
         ColonizationSettings { samples: 0, steps: 40, confine: false, ..ColonizationSettings::default() };
     change(&mut settings);
     let mut growth = growth(settings);
-    drains.iter().for_each(|&drain| _ = growth.systems[0].drains.add(drain));
+    drains
+        .iter()
+        .for_each(|&drain| _ = growth.systems[0].drains.add(drains::Attraction { position: drain, side: Vec3::ZERO }));
     while !growth.is_finished() {
         growth.step();
         assert_sound(&growth);
@@ -263,4 +265,21 @@ fn blood_comes_over_where_both_systems_supplied_a_drain() {
     }
     growth.restart(ColonizationSettings { steps: 1, ..Default::default() }, &roots(), 1).expect("valid settings");
     assert!(growth.bed_links().is_empty());
+}
+
+#[test]
+fn lengths_and_given_radii_whose_powers_overflow_are_refused() {
+    let mut settings = ColonizationSettings::default();
+    settings.arterial.terminal_radius = 1e38;
+    let error = Colonization::new(disc(), settings, &roots(), 3).expect_err("a radius beyond all limits");
+    assert!(error.to_string().contains("terminal_radius"), "{error}");
+    for radius in [1e30, 1e-30] {
+        let mut given = VesselTree::new();
+        given.push_root(Vec3::new(-0.4, 0.0, 0.0), radius);
+        let mut roots = no_arteries();
+        roots.given.artery = Some(given);
+        let error =
+            Colonization::new(disc(), ColonizationSettings::default(), &roots, 3).expect_err("a radius of any size");
+        assert!(matches!(error, ColonizationError::GivenRadius { node: 0, .. }), "{error}");
+    }
 }

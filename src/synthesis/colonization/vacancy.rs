@@ -85,12 +85,13 @@ impl Vacancy {
         self.pieces.clear();
     }
 
-    /// Prepares for the candidates of a step, given λ and all blockers. Does nothing for tissues that cannot be cut.
+    /// Prepares for the candidates of a step, given λ and all blockers: nodes, with whether one supplies a side of a surface,
+    /// and drains. Does nothing for tissues that cannot be cut.
     pub fn prepare(
         &mut self,
         tissue: &dyn Tissue,
         scale: f32,
-        nodes: &[Vec3],
+        (nodes, supplies): (&[Vec3], impl Fn(u32, Vec3) -> bool),
         drains: impl Iterator<Item = (u32, Vec3)>,
     ) {
         if scale > self.cut_at || scale < self.cut_at * COARSE {
@@ -104,8 +105,8 @@ impl Vacancy {
         if self.pieces.is_empty() {
             return;
         }
-        for &node in &nodes[self.covered..] {
-            self.add_node(node);
+        for (node, &position) in nodes.iter().enumerate().skip(self.covered) {
+            self.add_node(position, |side| supplies(node as u32, side));
         }
         self.covered = nodes.len();
         if self.free_measure < ENOUGH * self.listed_measure {
@@ -153,13 +154,13 @@ impl Vacancy {
         }
     }
 
-    fn add_node(&mut self, position: Vec3) {
+    fn add_node(&mut self, position: Vec3, supplies: impl Fn(Vec3) -> bool) {
         let Self { pieces, index, blocked, until, radii, free_measure, .. } = self;
         let inverse = radii[0].recip();
         index.for_each_within(position, radii[0] * *until, |piece, distance| {
             let (piece, blocked) = (&pieces[piece as usize], &mut blocked[piece as usize]);
             let threshold = (distance.sqrt() + piece.reach) * inverse;
-            if threshold <= *until && threshold < blocked.by_nodes {
+            if threshold <= *until && threshold < blocked.by_nodes && supplies(piece.side) {
                 if blocked.by_nodes > *until {
                     *free_measure -= f64::from(piece.measure);
                 }
@@ -283,11 +284,13 @@ mod tests {
             let mut vacancy = Vacancy::default();
             vacancy.reset([0.16, 0.12], u64::from(SAMPLES));
             let numbered = || drains.iter().enumerate().map(|(slot, &position)| (slot as u32, position));
-            vacancy.prepare(tissue.as_ref(), 1.0, nodes, numbered());
+            vacancy.prepare(tissue.as_ref(), 1.0, (nodes, |_, _| true), numbered());
             // Drains that are removed and added again, and a λ that shrinks and grows, must leave no trace.
             vacancy.remove_drain(3, drains[3]);
             vacancy.add_drain(3, drains[3]);
-            [0.9, 0.5, 1.0].into_iter().for_each(|scale| vacancy.prepare(tissue.as_ref(), scale, nodes, numbered()));
+            for scale in [0.9, 0.5, 1.0] {
+                vacancy.prepare(tissue.as_ref(), scale, (nodes, |_, _| true), numbered());
+            }
             assert!(vacancy.listed_measure < 0.9 * vacancy.whole, "case {case}: too little is blocked to tell");
 
             let (mut pieced, mut plain) = (Vec::new(), Vec::new());

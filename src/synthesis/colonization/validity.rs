@@ -1,6 +1,7 @@
 //! The limits of the settings, and warnings about combinations with known artefacts.
 
 use super::settings::{ColonizationSettings, SystemSettings};
+use crate::synthesis::mesh::MAX_COORDINATE;
 use crate::synthesis::tree::VesselKind;
 use std::fmt;
 
@@ -153,10 +154,11 @@ impl SystemSettings {
         let range = |name, value: f32, ok: bool, limits| {
             if ok { Ok(()) } else { Err(SettingsError::OutOfRange { system: system.name(), name, value, limits }) }
         };
-        let positive =
-            |name, value: f32| range(name, value, value.is_finite() && value > 0.0, "a finite length above 0");
+        let positive = |name, value: f32| {
+            range(name, value, value > 0.0 && value <= MAX_COORDINATE, "a length above 0, at most 1e9")
+        };
         let not_negative =
-            |name, value: f32| range(name, value, value.is_finite() && value >= 0.0, "a finite length of at least 0");
+            |name, value: f32| range(name, value, (0.0..=MAX_COORDINATE).contains(&value), "a length from 0 to 1e9");
         let weight = self.direction_weight;
         range("direction_weight", weight, (0.0..=1.0).contains(&weight), "between 0 and 1")?;
         not_negative("drain_birth_distance", self.drain_birth_distance)?;

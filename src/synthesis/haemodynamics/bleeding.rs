@@ -6,6 +6,8 @@
 //! A step evaluates openings, root and bed pressure at its middle, solves for the flow of all ends together and keeps
 //! it for the whole step. This is second order in the step, and the loss is exactly the time integral of the reported
 //! flow. A long step is divided into shorter ones, so that a fast pulse is followed and a simulator may skip minutes.
+//! So is one in which much of the patient's blood flows. Blood that isn't there doesn't flow: the last part of a step gives
+//! what is left, whatever drives it.
 
 use crate::synthesis::haemodynamics::{BloodVolume, Clotting};
 use crate::synthesis::haemodynamics::{Circulation, EndSide, FlowError, Network, NetworkEnd, RootPressure};
@@ -175,10 +177,23 @@ impl Bleeding {
     pub fn step(&mut self, network: &mut Network, seconds: f64, blood: &mut BloodVolume) -> Result<(), FlowError> {
         let parts = self.begin(network, seconds)?;
         for _ in 0..parts {
-            let part = seconds / f64::from(parts);
-            self.prepare(network, part, self.rate, blood)?;
-            network.solve_ends()?;
-            self.collect(network, part, blood);
+            let mut left = seconds / f64::from(parts);
+            loop {
+                let mut part = left;
+                self.prepare(network, part, self.rate, blood)?;
+                network.solve_ends()?;
+                if let Some(shorter) = blood.shorter(flow_of(network), part) {
+                    part = shorter;
+                    self.prepare(network, part, flow_of(network), blood)?;
+                    network.solve_ends()?;
+                }
+                let share = blood.share_there(flow_of(network), part);
+                self.collect(network, part, share, blood);
+                left -= part;
+                if !(left > 0.0) {
+                    break;
+                }
+            }
         }
         self.end(seconds);
         Ok(())
@@ -197,17 +212,40 @@ impl Bleeding {
     ) -> Result<(), FlowError> {
         let parts = arteries.begin(circulation.arterial(), seconds)?.max(veins.begin(circulation.venous(), seconds)?);
         for _ in 0..parts {
-            let part = seconds / f64::from(parts);
-            let rate = arteries.rate + veins.rate;
-            arteries.prepare(circulation.arterial_mut(), part, rate, blood)?;
-            veins.prepare(circulation.venous_mut(), part, rate, blood)?;
-            circulation.solve()?;
-            arteries.collect(circulation.arterial(), part, blood);
-            veins.collect(circulation.venous(), part, blood);
+            let mut left = seconds / f64::from(parts);
+            loop {
+                let mut part = left;
+                let rate = arteries.rate + veins.rate;
+                Self::solve_joined([arteries, veins], circulation, part, rate, blood)?;
+                let rate = |joined: &Circulation| flow_of(joined.arterial()) + flow_of(joined.venous());
+                if let Some(shorter) = blood.shorter(rate(circulation), part) {
+                    part = shorter;
+                    Self::solve_joined([arteries, veins], circulation, part, rate(circulation), blood)?;
+                }
+                let share = blood.share_there(rate(circulation), part);
+                arteries.collect(circulation.arterial(), part, share, blood);
+                veins.collect(circulation.venous(), part, share, blood);
+                left -= part;
+                if !(left > 0.0) {
+                    break;
+                }
+            }
         }
         arteries.end(seconds);
         veins.end(seconds);
         Ok(())
+    }
+
+    fn solve_joined(
+        [arteries, veins]: [&mut Self; 2],
+        circulation: &mut Circulation,
+        part: f64,
+        rate: f64,
+        blood: &BloodVolume,
+    ) -> Result<(), FlowError> {
+        arteries.prepare(circulation.arterial_mut(), part, rate, blood)?;
+        veins.prepare(circulation.venous_mut(), part, rate, blood)?;
+        circulation.solve()
     }
 
     /// Every open end, in the order of [`Network::open_ends`].
@@ -318,15 +356,16 @@ impl Bleeding {
         self.settings.clotting.map_or(1.0, |clotting| clotting.opening(diameter, age))
     }
 
-    /// Takes the flows of a part of a step over, once the network has solved for them.
-    fn collect(&mut self, network: &Network, part: f64, blood: &mut BloodVolume) {
+    /// Takes the flows of a part of a step over, once the network has solved for them. Only a `share` of the blood that
+    /// would flow is there.
+    fn collect(&mut self, network: &Network, part: f64, share: f64, blood: &mut BloodVolume) {
         self.rate = 0.0;
         for (end, open) in self.ends.iter_mut().zip(network.open_ends()) {
-            let flow = open.flow().cubic_metres_per_second();
+            let flow = share * open.flow().cubic_metres_per_second();
             self.rate += flow;
-            end.flow = open.flow();
+            end.flow = Flow::from_cubic_metres_per_second(flow);
             end.pressure = open.pressure();
-            end.velocity = open.velocity();
+            end.velocity = if flow > 0.0 { open.velocity() } else { 0.0 };
             end.lost_in_step += flow * part;
             end.age += part;
             end.state = match (flow > 0.0, open.opening > 0.0) {
@@ -356,4 +395,9 @@ impl Bleeding {
         self.lost += lost;
         self.mean_rate = if seconds > 0.0 { lost / seconds } else { self.rate };
     }
+}
+
+/// Flow of all open ends, in m³/s.
+fn flow_of(network: &Network) -> f64 {
+    network.open_ends().iter().map(|end| end.flow().cubic_metres_per_second()).sum()
 }

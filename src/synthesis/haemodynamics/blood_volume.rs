@@ -85,6 +85,9 @@ pub struct BloodVolume {
 }
 
 impl BloodVolume {
+    /// Largest share of the blood that flows in one part of a step.
+    const LARGEST_SHARE: f64 = 1.0 / 64.0;
+
     /// The blood of a patient who has lost none.
     ///
     /// # Errors
@@ -104,8 +107,7 @@ impl BloodVolume {
         Volume::from_cubic_metres(self.lost)
     }
 
-    /// Share of the blood that is lost; above 1 if more was lost than there was, which can happen only if the loss
-    /// doesn't lower the pressure.
+    /// Share of the blood that is lost, from 0 to 1.
     pub fn lost_share(&self) -> f64 {
         self.lost / self.settings.total.cubic_metres()
     }
@@ -120,9 +122,28 @@ impl BloodVolume {
         self.settings.pressure_share(Volume::from_cubic_metres(self.lost + more))
     }
 
-    /// Takes blood away.
+    /// The time in seconds in which a loss of `rate` m³/s takes the largest share of the blood that one part of a step may
+    /// take; `None` if that is no less than `seconds`, or no blood is left.
+    pub(super) fn shorter(&self, rate: f64, seconds: f64) -> Option<f64> {
+        let most = Self::LARGEST_SHARE * self.settings.total.cubic_metres();
+        (self.left() > 0.0 && rate * seconds > 2.0 * most).then(|| most / rate)
+    }
+
+    /// The share of a loss of `rate` m³/s over a time in seconds that is there to be lost.
+    pub(super) fn share_there(&self, rate: f64, seconds: f64) -> f64 {
+        let loss = rate * seconds;
+        // A rate over no time needs no blood but some that could flow.
+        if loss > self.left() || self.left() == 0.0 { self.left() / loss.max(f64::MIN_POSITIVE) } else { 1.0 }
+    }
+
+    /// What is left, in m³.
+    fn left(&self) -> f64 {
+        (self.settings.total.cubic_metres() - self.lost).max(0.0)
+    }
+
+    /// Takes blood away, at most what is left.
     pub fn lose(&mut self, volume: Volume) {
-        self.lost += volume.cubic_metres();
+        self.lost = (self.lost + volume.cubic_metres()).min(self.settings.total.cubic_metres());
     }
 
     /// Gives blood back, at most the lost volume.

@@ -45,6 +45,17 @@ pub enum FlowError {
         /// The lowest pressure of a beat, in mmHg.
         diastolic: f64,
     },
+    /// A flow that no bed gives.
+    #[error(
+        "{flow} mL/min are to enter the organ, but at most about {nearest} do with any bed; check the scale and the radii, \
+        or ask for another flow"
+    )]
+    OutOfReach {
+        /// The flow asked for, in mL/min.
+        flow: f64,
+        /// The nearest one found, in mL/min.
+        nearest: f64,
+    },
     /// A share outside 0 to 1.
     #[error("{what} is {value}; it must be a share from 0 to 1")]
     Share {

@@ -16,10 +16,15 @@
 //! no pass if nothing has changed. A piece that only links connect could have any pressure; a leak of 10⁻¹¹ of each
 //! link into the pool gives it the pool's. Newton's method around this solves for open ends, as in a single tree.
 
-use super::{FlowError, Network, open_ends::OpenEnds, side::Side};
+use super::{
+    FlowError, Network,
+    open_ends::OpenEnds,
+    side::{LEAST_PRESSURE, Side},
+};
 use crate::synthesis::{
     pace::{Pace, at_once},
     tree::BedLink,
+    units::Resistance,
 };
 
 /// Arteries and veins of an organ, joined through the bed.
@@ -96,6 +101,21 @@ impl Circulation {
         self.venous.set_links(links.iter().map(|link| link.venous), &pace.part(0.5..1.0)).await;
         self.links = links.len();
         Ok(())
+    }
+
+    /// Resistance of each link, and of the bed behind each terminal without one.
+    pub fn bed_resistance(&self) -> Resistance {
+        Resistance::from_pascal_seconds_per_cubic_metre(1.0 / self.conductance)
+    }
+
+    /// Replaces it, and solves.
+    pub(super) fn set_bed_resistance(&mut self, resistance: Resistance) -> Result<(), FlowError> {
+        self.conductance = 1.0 / resistance.pascal_seconds_per_cubic_metre();
+        for network in [&mut self.arterial, &mut self.venous] {
+            network.settings.bed.resistance = Some(resistance);
+            at_once(network.set_beds(&Pace::default()));
+        }
+        self.solve()
     }
 
     /// The arteries.
@@ -296,14 +316,15 @@ impl Circulation {
     }
 
     /// The tolerance: an imbalance relative to the largest flow in a link, and a correction relative to the pressures,
-    /// but at least the effect of rounding of the pressures.
+    /// but at least the effect of rounding of the pressures, and of a pressure that is as good as none.
     fn tolerated(&self, accuracy: f64, arterial: &[f64], venous: &[f64]) -> Tolerated {
         let [arteries, veins] = &self.sides;
         let links = arteries.of_links.iter().zip(&veins.of_links);
         let flows = links.map(|(&a, &v)| self.conductance * (arterial[a as usize] - venous[v as usize]).abs());
-        let pressure = largest(arterial).max(largest(venous)).max(self.arterial.source.abs());
+        let pressure = largest(arterial).max(largest(venous)).max(self.arterial.source.abs()).max(LEAST_PRESSURE);
         let rounding = Self::ROUNDING * self.conductance * pressure;
-        Tolerated { accuracy, flow: accuracy * flows.fold(0.0, f64::max) + rounding, pressure: accuracy * pressure }
+        let least = self.conductance * LEAST_PRESSURE;
+        Tolerated { accuracy, flow: accuracy * flows.fold(least, f64::max) + rounding, pressure: accuracy * pressure }
     }
 }
 

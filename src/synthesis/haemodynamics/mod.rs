@@ -41,6 +41,7 @@ pub mod bleeding;
 pub mod blood_volume;
 mod circuit;
 pub mod clotting;
+mod demand;
 mod error;
 mod gaps;
 mod interruption;

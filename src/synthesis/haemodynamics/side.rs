@@ -7,6 +7,10 @@ use super::{
 };
 use crate::synthesis::{pace::Pace, tree::NodeId};
 
+/// A pressure as good as none, in Pa: a hundred-thousandth of a mmHg. A patient without blood has no more, and then
+/// nothing is large enough to measure an error by.
+pub(super) const LEAST_PRESSURE: f64 = 1e-3;
+
 /// The linked nodes of one network, and its response to currents into them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Side {
@@ -134,7 +138,7 @@ impl Network {
     pub(super) fn accept_ends(&mut self, quotient: &Quotient, damped: bool) -> f64 {
         let ambient = self.ambient();
         self.ends.count_from(ambient);
-        let rounding = 1e-11 * self.source.abs().max(ambient.abs());
+        let rounding = 1e-11 * self.source.abs().max(ambient.abs()).max(LEAST_PRESSURE);
         self.ends.accept(|end| quotient.pressure(quotient.joint_at(end.attached)) - ambient, rounding, damped)
     }
 

@@ -24,6 +24,12 @@ impl IndexedMesh {
         Self { mesh, index }
     }
 
+    /// Indexes a mesh whose [faces](TriangleMesh::faces_paced) are known.
+    pub(crate) async fn of_paced(mesh: Arc<TriangleMesh>, faces: &[u32], pace: &Pace) -> Self {
+        let index = Arc::new(TriangleIndex::of_paced(&mesh, faces, pace).await);
+        Self { mesh, index }
+    }
+
     /// The mesh.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh

@@ -8,8 +8,10 @@ pub(crate) mod bit_grid;
 pub mod closure;
 pub(crate) mod crossing;
 pub(crate) mod disjoint_sets;
+pub(crate) mod facing;
 mod indexed;
 pub mod intersections;
+mod neighbours;
 mod separation;
 mod shaded;
 #[cfg(test)]
@@ -21,6 +23,7 @@ mod triangle_mesh;
 pub(crate) mod triangle_pair;
 mod vertex_normals;
 pub(crate) mod voxels;
+pub(crate) mod way;
 mod welding;
 pub(crate) mod winding;
 

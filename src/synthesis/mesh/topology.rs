@@ -9,11 +9,11 @@ use std::collections::VecDeque;
 
 /// An edge between two welded vertices, in one of its triangles. Their order puts uses of the same edge side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct EdgeUse {
+pub(super) struct EdgeUse {
     /// The lower vertex in the upper half, the higher in the lower half.
-    key: u64,
+    pub key: u64,
     /// The triangle.
-    triangle: u32,
+    pub triangle: u32,
     /// Whether the triangle runs from the lower vertex to the higher.
     forward: bool,
 }
@@ -23,7 +23,7 @@ struct EdgeUse {
 pub struct MeshTopology {
     welding: Welding,
     /// Corners as welded vertices; `None` for a degenerate triangle.
-    triangles: Vec<Option<[u32; 3]>>,
+    pub(super) triangles: Vec<Option<[u32; 3]>>,
     /// Every use of every edge, sorted by edge.
     edges: Vec<EdgeUse>,
 }
@@ -37,23 +37,31 @@ impl TriangleMesh {
     /// The same as [paced](crate::synthesis::pace) work.
     pub async fn topology_paced(&self, pace: &Pace) -> MeshTopology {
         let welding = self.weld_paced(&pace.part(0.0..0.2)).await;
-        let mut edges = Vec::with_capacity(3 * self.triangles().len());
-        let mut triangles = Vec::with_capacity(self.triangles().len());
+        let mut numbers = Vec::with_capacity(self.triangles().len());
         let take = |triangle: usize| {
-            if is_degenerate(self.corners(triangle)) {
-                triangles.push(None);
-                return;
-            }
-            let corners = self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32);
-            triangles.push(Some(corners));
-            for side in 0..3 {
-                let (from, to) = (corners[side], corners[(side + 1) % 3]);
-                let key = u64::from(from.min(to)) << 32 | u64::from(from.max(to));
-                edges.push(EdgeUse { key, triangle: triangle as u32, forward: from < to });
+            if !is_degenerate(self.corners(triangle)) {
+                numbers.push(triangle as u32);
             }
         };
-        pace.part(0.2..0.3).each(self.triangles().len(), take).await;
-        pace.part(0.3..1.0).sort(&mut edges).await;
+        pace.part(0.2..0.25).each(self.triangles().len(), take).await;
+        self.topology_of_paced(welding, &numbers, &pace.part(0.25..1.0)).await
+    }
+
+    /// The topology of the triangles with these numbers, none of which is degenerate. The others don't count.
+    pub(crate) async fn topology_of_paced(&self, welding: Welding, numbers: &[u32], pace: &Pace) -> MeshTopology {
+        let mut edges = Vec::with_capacity(3 * numbers.len());
+        let mut triangles = vec![None; self.triangles().len()];
+        let take = |place: usize| {
+            let triangle = numbers[place] as usize;
+            let corners = self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32);
+            triangles[triangle] = Some(corners);
+            for side in 0..3 {
+                let (from, to) = (corners[side], corners[(side + 1) % 3]);
+                edges.push(EdgeUse { key: edge_key(from, to), triangle: triangle as u32, forward: from < to });
+            }
+        };
+        pace.part(0.0..0.1).each(numbers.len(), take).await;
+        pace.part(0.1..1.0).sort(&mut edges).await;
         MeshTopology { welding, triangles, edges }
     }
 
@@ -206,7 +214,7 @@ impl MeshTopology {
     }
 
     /// The uses of each edge.
-    fn fans(&self) -> impl Iterator<Item = &[EdgeUse]> {
+    pub(super) fn fans(&self) -> impl Iterator<Item = &[EdgeUse]> {
         self.edges.chunk_by(|a, b| a.key == b.key)
     }
 
@@ -277,6 +285,11 @@ impl MeshTopology {
         }
         sides
     }
+}
+
+/// Both ends of an edge, the lower vertex first.
+pub(super) fn edge_key(from: u32, to: u32) -> u64 {
+    u64::from(from.min(to)) << 32 | u64::from(from.max(to))
 }
 
 /// Parts of a surface.

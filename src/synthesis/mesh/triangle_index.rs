@@ -18,7 +18,19 @@ pub struct SurfacePoint {
     pub distance_squared: f32,
 }
 
-/// Index over the triangles of a mesh that are not degenerate.
+impl SurfacePoint {
+    /// The point of a triangle nearest to `point`.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    pub(crate) fn on(mesh: &TriangleMesh, triangle: usize, point: Vec3) -> Self {
+        let (weights, position) = closest_on_triangle(point, mesh.corners(triangle));
+        let distance_squared = (position - point.as_dvec3()).length_squared() as f32;
+        Self { position: position.as_vec3(), triangle, barycentric: weights.as_vec3(), distance_squared }
+    }
+}
+
+/// Index over the triangles of a mesh, without degenerate ones and without copies of another.
 #[derive(Clone, Debug, Default)]
 pub struct TriangleIndex {
     tree: BoxTree,
@@ -29,22 +41,22 @@ pub struct TriangleIndex {
 }
 
 impl TriangleIndex {
-    /// Indexes a mesh. Degenerate triangles are left out.
+    /// Indexes a mesh. Degenerate triangles are left out, and so are repeated ones.
     pub fn new(mesh: &TriangleMesh) -> Self {
         at_once(Self::new_paced(mesh, &Pace::default()))
     }
 
     /// The same as [paced](crate::synthesis::pace) work.
     pub async fn new_paced(mesh: &TriangleMesh, pace: &Pace) -> Self {
-        let mut numbers: Vec<u32> = Vec::with_capacity(mesh.triangles().len());
-        let take = |number: usize| {
-            if !mesh.is_degenerate(number) {
-                numbers.push(number as u32);
-            }
-        };
-        pace.part(0.0..0.05).each(mesh.triangles().len(), take).await;
+        let welding = mesh.weld_paced(&pace.part(0.0..0.1)).await;
+        let faces = mesh.faces_paced(&welding, &pace.part(0.1..0.3)).await;
+        Self::of_paced(mesh, &faces, &pace.part(0.3..1.0)).await
+    }
+
+    /// Indexes the triangles of a mesh with these numbers, which must be its [faces](TriangleMesh::faces_paced).
+    pub(crate) async fn of_paced(mesh: &TriangleMesh, numbers: &[u32], pace: &Pace) -> Self {
         let bounds = |id: usize| Bounds::around(&mesh.corners(numbers[id] as usize));
-        let tree = BoxTree::new_paced(numbers.len(), bounds, &pace.part(0.05..0.9)).await;
+        let tree = BoxTree::new_paced(numbers.len(), bounds, &pace.part(0.0..0.9)).await;
         let (order, number) = (tree.order(), |slot: usize| numbers[tree.order()[slot] as usize]);
         let triangles: Vec<u32> = pace.part(0.9..0.92).collect(order.len(), number).await;
         let corner = |slot: usize| mesh.corners(triangles[slot] as usize);

@@ -174,7 +174,7 @@ impl TriangleMesh {
         self.triangles[triangle].map(|index| self.positions[index as usize])
     }
 
-    /// The smallest box that holds every vertex that a triangle uses.
+    /// The smallest box that holds every triangle with an area.
     pub fn bounds(&self) -> Aabb3d {
         at_once(self.bounds_paced(&Pace::default()))
     }
@@ -184,9 +184,12 @@ impl TriangleMesh {
         let mut min = Vec3::INFINITY;
         let mut max = Vec3::NEG_INFINITY;
         let enclose = |triangle: usize| {
-            for position in self.corners(triangle) {
-                min = min.min(position);
-                max = max.max(position);
+            let corners = self.corners(triangle);
+            if !is_degenerate(corners) {
+                for position in corners {
+                    min = min.min(position);
+                    max = max.max(position);
+                }
             }
         };
         pace.each(self.triangles.len(), enclose).await;

@@ -77,41 +77,40 @@ impl TriangleMesh {
         let mut positions = vec![Vec3::ZERO; welding.count()];
         let place = |vertex: usize| positions[welding.vertex(vertex as u32)] = self.positions()[vertex];
         pace.part(0.3..0.4).each(self.positions().len(), place).await;
-        let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(self.triangles().len());
-        let take = |triangle: usize| {
-            if !self.is_degenerate(triangle) {
-                triangles.push(self.triangles()[triangle].map(|vertex| welding.vertex(vertex) as u32));
-            }
-        };
-        pace.part(0.4..0.6).each(self.triangles().len(), take).await;
-        let triangles = without_repeats(triangles, &pace.part(0.6..1.0)).await;
+        let faces = self.faces_paced(&welding, &pace.part(0.4..0.9)).await;
+        let corner = |face: usize| self.triangles()[faces[face] as usize].map(|vertex| welding.vertex(vertex) as u32);
+        let triangles = pace.part(0.9..1.0).collect(faces.len(), corner).await;
         Self { positions, triangles, uvs: None }
     }
-}
 
-/// Drops triangles with the same three vertices as an earlier one, in any order.
-async fn without_repeats(triangles: Vec<[u32; 3]>, pace: &Pace) -> Vec<[u32; 3]> {
-    let key = |number: usize| {
-        let mut sorted = triangles[number];
-        sorted.sort_unstable();
-        (sorted, number as u32)
-    };
-    let mut keys: Vec<([u32; 3], u32)> = pace.part(0.0..0.2).collect(triangles.len(), key).await;
-    pace.part(0.2..0.8).sort(&mut keys).await;
-    let mut is_repeat = vec![false; triangles.len()];
-    let compare = |pair: usize| {
-        let [(first, _), (second, number)] = [keys[pair], keys[pair + 1]];
-        is_repeat[number as usize] = first == second;
-    };
-    pace.part(0.8..0.9).each(keys.len().saturating_sub(1), compare).await;
-    let mut kept = Vec::with_capacity(triangles.len());
-    let keep = |number: usize| {
-        if !is_repeat[number] {
-            kept.push(triangles[number]);
-        }
-    };
-    pace.part(0.9..1.0).each(triangles.len(), keep).await;
-    kept
+    /// The numbers, in order, of the triangles that make up the surface: those with an area, of which each is there
+    /// once. A triangle with the three corners of an earlier one, in any order, is a copy or the other side of it.
+    pub(crate) async fn faces_paced(&self, welding: &Welding, pace: &Pace) -> Vec<u32> {
+        let mut keys: Vec<([u32; 3], u32)> = Vec::with_capacity(self.triangles().len());
+        let enter = |number: usize| {
+            if !self.is_degenerate(number) {
+                let mut sorted = self.triangles()[number].map(|vertex| welding.vertex(vertex) as u32);
+                sorted.sort_unstable();
+                keys.push((sorted, number as u32));
+            }
+        };
+        pace.part(0.0..0.3).each(self.triangles().len(), enter).await;
+        pace.part(0.3..0.8).sort(&mut keys).await;
+        let mut is_face = vec![false; self.triangles().len()];
+        let mark = |place: usize| {
+            let (corners, number) = keys[place];
+            is_face[number as usize] = place == 0 || keys[place - 1].0 != corners;
+        };
+        pace.part(0.8..0.9).each(keys.len(), mark).await;
+        let mut faces = Vec::with_capacity(keys.len());
+        let take = |number: usize| {
+            if is_face[number] {
+                faces.push(number as u32);
+            }
+        };
+        pace.part(0.9..1.0).each(is_face.len(), take).await;
+        faces
+    }
 }
 
 fn hash(position: Vec3) -> u64 {

@@ -20,14 +20,29 @@ pub(crate) async fn oriented(mesh: TriangleMesh, index: &TriangleIndex, pace: &P
     let mesh = mesh.with_flipped_paced(|triangle| misoriented[triangle], &pace.part(0.7..0.72)).await;
     let (patches, closed) = topology.manifold_patches(&pace.part(0.72..0.8)).await;
     let volumes = shell_volumes(&mesh, &patches, &pace.part(0.8..0.9)).await;
-    let pace = pace.part(0.9..1.0);
-    let largest =
-        volumes.iter().fold(0.0f64, |largest, volume| if volume.abs() > largest.abs() { *volume } else { largest });
-    let against: Vec<bool> =
-        volumes.iter().zip(closed).map(|(volume, closed)| closed && volume * largest < 0.0).collect();
+    let flip = shells_against(&mesh, &patches, &closed, &volumes, index, &pace.part(0.9..0.92)).await;
+    let pace = pace.part(0.92..1.0);
+    let turned = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| flip[patch as usize]);
+    let was_turned = |triangle: usize| misoriented[triangle] != turned(triangle);
+    let loose = topology.unbalanced_paced(was_turned, &pace.part(0.0..0.7)).await;
+    (mesh.with_flipped_paced(turned, &pace.part(0.7..1.0)).await, loose)
+}
+
+/// Which parts of a surface are closed and oriented against the largest one, and no cavities in it. `mesh` is oriented
+/// alike within each part; `index` may be that of the mesh before.
+pub(super) async fn shells_against(
+    mesh: &TriangleMesh,
+    patches: &Patches,
+    closed: &[bool],
+    volumes: &[f64],
+    index: &TriangleIndex,
+    pace: &Pace,
+) -> Vec<bool> {
+    let largest = largest_of(volumes.iter().copied());
+    let mut against: Vec<bool> =
+        volumes.iter().zip(closed).map(|(volume, &closed)| closed && volume * largest < 0.0).collect();
     if !against.contains(&true) {
-        let loose = topology.unbalanced_paced(|triangle| misoriented[triangle], &pace).await;
-        return (mesh, loose);
+        return against;
     }
     let mut members = vec![Vec::new(); patches.count];
     let enter = |triangle: usize| {
@@ -36,20 +51,20 @@ pub(crate) async fn oriented(mesh: TriangleMesh, index: &TriangleIndex, pace: &P
         }
     };
     pace.part(0.0..0.2).each(patches.of_triangle.len(), enter).await;
-    let facing_right = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| !against[patch as usize]);
-    let mut flip: Vec<bool> = Vec::with_capacity(patches.count);
-    for patch in 0..patches.count {
+    let turns = against.clone();
+    let facing_right = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| !turns[patch as usize]);
+    for patch in (0..patches.count).filter(|&patch| turns[patch]) {
         let step = members[patch].len().div_ceil(PROBES).max(1);
         let mut probes = members[patch].iter().step_by(step).map(|&triangle| mesh.corners(triangle)[0]);
-        flip.push(against[patch] && !probes.all(|probe| is_enclosed(probe, &mesh, index, facing_right)));
-        if against[patch] {
-            pace.rest(0.0).await;
-        }
+        against[patch] = !probes.all(|probe| is_enclosed(probe, mesh, index, facing_right));
+        pace.rest(0.2).await;
     }
-    let turned = |triangle: usize| patches.of_triangle[triangle].is_some_and(|patch| flip[patch as usize]);
-    let was_turned = |triangle: usize| misoriented[triangle] != turned(triangle);
-    let loose = topology.unbalanced_paced(was_turned, &pace.part(0.2..0.8)).await;
-    (mesh.with_flipped_paced(turned, &pace.part(0.8..1.0)).await, loose)
+    against
+}
+
+/// The number of the largest amount.
+pub(super) fn largest_of(numbers: impl Iterator<Item = f64>) -> f64 {
+    numbers.fold(0.0f64, |largest, number| if number.abs() > largest.abs() { number } else { largest })
 }
 
 /// Signed volume of every part of the surface.

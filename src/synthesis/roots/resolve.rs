@@ -51,7 +51,7 @@ impl Roots {
                 },
                 RootPlacement::Within(reach) => {
                     check_reach(kind, *reach)?;
-                    within(tissue, kind, reach * diameter, &mut rng)?
+                    within(tissue, kind, reach * diameter, own.reach, &mut rng)?
                 }
                 RootPlacement::Beside => {
                     let others = self.neighbours(tissue, kind.companion(), &roots);
@@ -118,7 +118,7 @@ fn exact(tissue: &dyn Tissue, kind: VesselKind, points: &[Vec3], reach: f32) -> 
         if distance > reach {
             return Err(RootError::TooFar { kind, position, distance, reach });
         }
-        Ok(TissuePoint { position, normal: closest.normal })
+        Ok(tissue.point_at(position))
     };
     points.iter().map(place).collect()
 }

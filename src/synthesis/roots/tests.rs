@@ -99,7 +99,7 @@ fn given_points_are_taken_or_brought_to_the_tissue() -> Result<(), TissueError> 
     .into();
     let Ok(placed) = roots.resolve(&tissue, &SPACING, 0) else { panic!("no roots") };
     assert!(placed.artery[0].position.distance(at(-0.5, 0.0)) < 1e-6);
-    assert_eq!(placed.vein[0], TissuePoint { position: Vec3::new(-0.4, 0.0, 0.01), normal: Vec3::Z });
+    assert_eq!(placed.vein[0], TissuePoint::new(Vec3::new(-0.4, 0.0, 0.01), Vec3::Z));
 
     let with = |artery| placed_arteries(artery).resolve(&tissue, &SPACING, 0);
     let error = with(RootPlacement::Exact(far));

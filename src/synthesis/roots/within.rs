@@ -23,9 +23,12 @@ const LINKS: NonZeroUsize = NonZeroUsize::new(12).expect("12 is not zero");
 /// Largest distance of a link from the tissue, as a share of its length: more than a surface bends away below it, less
 /// than the gap between two folds.
 const GAP: f32 = 0.15;
+/// Distance by which a way along the tissue may miss the other end of a link, as a share of its length.
+const MISSED: f32 = 0.25;
 /// Points of a link that must be in the tissue, or this near to it.
 const BETWEEN: u32 = 5;
-/// Cosine of the angle between one normal and the opposite of the other from which two walls face each other.
+/// Cosine of the angle between one normal and the opposite of the other from which two sides face each other, or away
+/// from each other.
 const FACING: f32 = 0.5;
 /// Reach of one of several roots, as a share of that of a single one: a tissue that needs several is narrow, and
 /// vessels advance more slowly in a narrow tissue.
@@ -35,7 +38,7 @@ const TRIES: u32 = 8;
 /// One sample in this many may stay out of reach, in corners and bits of tissue too small for a root.
 const SPARED: usize = 200;
 
-/// Finds roots such that all tissue is within `way` of one, along the tissue.
+/// Finds roots such that all tissue is within `way` of one, along the tissue. Vessels perceive tissue within `reach`.
 ///
 /// The seed's first sample is the root if it reaches everything, else the first sample that does. If none does, the
 /// first stays, and the sample furthest from all roots is added repeatedly, until all are near enough.
@@ -43,6 +46,7 @@ pub(super) fn within(
     tissue: &dyn Tissue,
     kind: VesselKind,
     way: f32,
+    reach: f32,
     rng: &mut VesselRng,
 ) -> Result<Vec<TissuePoint>, RootError> {
     let samples = draw(tissue, SPREAD_SAMPLES, rng);
@@ -55,7 +59,7 @@ pub(super) fn within(
         return Ok(vec![place(&samples[0])]);
     }
     let places: Vec<TissuePoint> = samples.iter().map(place).collect();
-    Ok(Web::over(tissue, &places).centers(way).into_iter().map(|center| places[center as usize]).collect())
+    Ok(Web::over(tissue, &places, reach).centers(way).into_iter().map(|center| places[center as usize]).collect())
 }
 
 /// Samples, joined to their nearest neighbours.
@@ -65,19 +69,40 @@ struct Web {
 }
 
 impl Web {
-    fn over(tissue: &dyn Tissue, samples: &[TissuePoint]) -> Self {
+    fn over(tissue: &dyn Tissue, samples: &[TissuePoint], reach: f32) -> Self {
         let mut links = vec![Vec::new(); samples.len()];
         for (a, b) in nearest_pairs(samples) {
             let ends = [samples[a as usize], samples[b as usize]];
             if leads_through(tissue, ends) {
-                // A vessel keeps its direction for a while, so bends of the surface slow it down.
+                // A vessel keeps its direction for a while, so bends of the surface slow it down. Twice the bend is what the
+                // folds of real organs ask for, so that each of their parts is supplied.
                 let bend = ends[0].normal.distance(ends[1].normal);
-                let length = ends[0].position.distance(ends[1].position) * (1.0 + bend);
+                let length = ends[0].position.distance(ends[1].position) * (1.0 + 2.0 * bend);
                 links[a as usize].push((b, length));
                 links[b as usize].push((a, length));
             }
         }
-        Self { links }
+        let mut web = Self { links };
+        web.part_at_rims(samples, reach);
+        web
+    }
+
+    /// Joins each sample on the rim of a wall to one side of it only. Vessels on one side supply much of the rim of a wall
+    /// that is thinner than `reach`, and then little draws them round it.
+    fn part_at_rims(&mut self, samples: &[TissuePoint], reach: f32) {
+        let normal = |sample: u32| samples[sample as usize].normal;
+        for rim in 0..samples.len() {
+            let distance = |other: u32| samples[rim].position.distance(samples[other as usize].position);
+            let mut near: Vec<u32> = self.links[rim].iter().map(|&(other, _)| other).collect();
+            near.retain(|&other| distance(other) < reach);
+            near.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+            let Some(&side) = near.first() else { continue };
+            near.retain(|&other| normal(side).dot(normal(other)) < -FACING);
+            for other in near {
+                self.links[rim].retain(|&(linked, _)| linked != other);
+                self.links[other as usize].retain(|&(linked, _)| linked != rim as u32);
+            }
+        }
     }
 
     fn centers(&self, way: f32) -> Vec<u32> {
@@ -146,12 +171,18 @@ fn nearest_pairs(samples: &[TissuePoint]) -> Vec<(u32, u32)> {
 /// Whether the tissue continues between two of its points, without a gap that vessels would have to cross.
 fn leads_through(tissue: &dyn Tissue, [from, to]: [TissuePoint; 2]) -> bool {
     let way = to.position - from.position;
-    // Two facing walls, such as those of two folds, may be nearer than samples are.
+    // Two facing walls, such as those of two folds, may be nearer than samples are, and so may the two sides of one wall.
     let opposite = from.normal.dot(to.normal) < -FACING;
-    if opposite && from.normal.dot(way) > 0.0 && to.normal.dot(way) < 0.0 {
+    if opposite && from.normal.dot(way) * to.normal.dot(way) < 0.0 {
         return false;
     }
-    let allowed = GAP * way.length();
+    let length = way.length();
+    let mut end = from;
+    tissue.walk(&from, way / length, length, length, &mut |place| end = place);
+    if end.position.distance(to.position) > MISSED * length {
+        return false;
+    }
+    let allowed = GAP * length;
     (1..=BETWEEN).map(|step| from.position + way * (step as f32 / (BETWEEN + 1) as f32)).all(|between| {
         tissue.closest_point(between).position.distance_squared(between) <= allowed * allowed
             && !tissue.no_go().is_some_and(|no_go| no_go.forbids(between))

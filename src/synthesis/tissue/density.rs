@@ -174,6 +174,21 @@ impl Tissue for DensityTissue {
         self.tissue.closest_point(point)
     }
 
+    fn has_facets(&self) -> bool {
+        self.tissue.has_facets()
+    }
+
+    fn walk(
+        &self,
+        from: &TissuePoint,
+        direction: Vec3,
+        length: f32,
+        tolerance: f32,
+        arrive: &mut dyn FnMut(TissuePoint),
+    ) {
+        self.tissue.walk(from, direction, length, tolerance, arrive);
+    }
+
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         let point = self.tissue.sample(rng)?;
         (rng.random::<f32>() < self.field.at(point)).then_some(point)

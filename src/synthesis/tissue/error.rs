@@ -1,5 +1,5 @@
 use crate::synthesis::mesh::{MAX_COORDINATE, MeshError, VoxelError};
-use bevy_math::Vec3;
+use bevy_math::{Vec3, bounding::Aabb3d};
 
 /// Why a tissue could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -14,6 +14,19 @@ pub enum TissueError {
         what: &'static str,
         /// The value found.
         value: f32,
+    },
+    /// A tissue so far from the origin that coordinates hold too little of its shape.
+    #[error(
+        "the tissue is {distance} from the origin, but only {size} long: coordinates there are {rounding} apart, too \
+        coarse for it; move it to the origin"
+    )]
+    TooFar {
+        /// Its largest coordinate.
+        distance: f32,
+        /// Its longest side.
+        size: f32,
+        /// Distance between neighbouring coordinates.
+        rounding: f32,
     },
     /// A size that must be above zero.
     #[error("{what} is {value}; it must be above 0")]
@@ -31,6 +44,17 @@ pub enum TissueError {
         "no part of the mesh's box is enclosed by it at a resolution of {resolution}; close its holes, or grow on the surface instead"
     )]
     NoInside {
+        /// Voxels along the longest side.
+        resolution: u32,
+    },
+    /// A mesh whose inside is so thin that voxels of this size can hardly find it.
+    #[error(
+        "what the mesh encloses fills {share} of the voxels that hold it at a resolution of {resolution}: it is too thin; \
+        raise the resolution, or grow on the surface instead"
+    )]
+    TooThin {
+        /// The share that it fills.
+        share: f32,
         /// Voxels along the longest side.
         resolution: u32,
     },
@@ -137,6 +161,24 @@ pub(super) fn finite_point(what: &'static str, point: Vec3) -> Result<Vec3, Tiss
         finite(what, value)?;
     }
     Ok(point)
+}
+
+/// Coordinates that a tissue's longest side must hold at least.
+const FEWEST_COORDINATES: f32 = 4096.0;
+
+/// Distance within which coordinates in a box are rounded.
+///
+/// # Errors
+/// A box too far from the origin for its size.
+pub(super) fn rounding_within(bounds: &Aabb3d) -> Result<f32, TissueError> {
+    let distance = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let size = (bounds.max - bounds.min).max_element();
+    let rounding = distance * f32::EPSILON;
+    if size >= FEWEST_COORDINATES * rounding {
+        Ok(2.0 * rounding)
+    } else {
+        Err(TissueError::TooFar { distance, size, rounding })
+    }
 }
 
 /// Checks that a size is finite and above zero.

@@ -52,11 +52,26 @@ impl TissueGrowth {
 
     /// Whether every size that this law gives within `steps` steps is finite and above zero.
     pub(crate) fn check(&self, steps: u32) -> Result<(), f32> {
+        let steps = match self {
+            // The last value stays.
+            Self::Table(sizes) => u32::try_from(sizes.len()).map_or(steps, |sizes| steps.min(sizes)),
+            // It only rises, so the last size is the largest; rounding makes it less, if anything.
+            Self::Linear(increment) if *increment >= 0.0 => {
+                let last = (1.0 + f64::from(*increment) * f64::from(steps)) as f32;
+                return if last.is_finite() { Ok(()) } else { Err(last) };
+            }
+            _ => steps,
+        };
         let mut size = 1.0;
         for step in 1..=steps {
+            let before = size;
             size = self.advance(size, step);
             if !(size.is_finite() && size > 0.0) {
                 return Err(size);
+            }
+            // What rounding has stopped changes no more.
+            if size == before && !matches!(self, Self::Table(_)) {
+                break;
             }
         }
         Ok(())
@@ -93,5 +108,19 @@ mod tests {
         assert!(TissueGrowth::Linear(-0.1).check(9).is_ok());
         assert!(TissueGrowth::Linear(-0.1).check(20).is_err());
         assert!(TissueGrowth::Exponential(10.0).check(100).is_err());
+        assert!(TissueGrowth::Linear(1e38).check(100).is_err());
+        assert!(TissueGrowth::Linear(f32::NAN).check(1).is_err());
+        assert!(TissueGrowth::Table(vec![1.0, 1.0, 0.0]).check(3).is_err());
+        assert!(TissueGrowth::Table(vec![1.0, 1.0, 0.0]).check(2).is_ok());
+    }
+
+    #[test]
+    fn as_many_steps_as_there_are_numbers_are_checked_as_well() {
+        for growth in [TissueGrowth::None, TissueGrowth::default(), TissueGrowth::Exponential(1e-9)] {
+            assert_eq!(growth.check(u32::MAX), Ok(()), "{growth:?}");
+        }
+        assert_eq!(TissueGrowth::Table(vec![2.0; 3]).check(u32::MAX), Ok(()));
+        assert!(TissueGrowth::Exponential(0.01).check(u32::MAX).is_err());
+        assert!(TissueGrowth::Linear(-0.01).check(u32::MAX).is_err());
     }
 }

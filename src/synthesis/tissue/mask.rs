@@ -260,7 +260,7 @@ impl Tissue for Mask {
         let inside = !self.flat && self.contains(point);
         let position =
             if inside || !point.is_finite() { point } else { self.nearest(point, f32::INFINITY).unwrap_or(point) };
-        TissuePoint { position, normal: if self.flat { Vec3::Z } else { Vec3::ZERO } }
+        TissuePoint::new(position, if self.flat { Vec3::Z } else { Vec3::ZERO })
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {

@@ -54,6 +54,15 @@ use crate::synthesis::random::VesselRng;
 use bevy_math::{Vec3, bounding::Aabb3d};
 use std::fmt::Debug;
 
+/// A flat piece of a tissue's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet {
+    /// The tissue's own number of it.
+    pub number: u32,
+    /// Its unit normal. Beside an edge it differs from the normal of the surface, which is smooth.
+    pub normal: Vec3,
+}
+
 /// A point of a tissue, found from a point nearby.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TissuePoint {
@@ -61,6 +70,16 @@ pub struct TissuePoint {
     pub position: Vec3,
     /// Unit normal of the tissue's surface there; `Vec3::ZERO` inside a volume, where none is defined.
     pub normal: Vec3,
+    /// The flat piece on which it lies, if the tissue is a surface made of such: directions at the point are those along
+    /// it.
+    pub facet: Option<Facet>,
+}
+
+impl TissuePoint {
+    /// A point on no facet.
+    pub const fn new(position: Vec3, normal: Vec3) -> Self {
+        Self { position, normal, facet: None }
+    }
 }
 
 /// The dimension of a tissue, with its size.
@@ -104,6 +123,29 @@ pub trait Tissue: Debug + Send + Sync {
 
     /// The point of the tissue nearest to `point`: `point` itself if the tissue contains it.
     fn closest_point(&self, point: Vec3) -> TissuePoint;
+
+    /// Whether points of the tissue lie on [facets](TissuePoint::facet).
+    fn has_facets(&self) -> bool {
+        false
+    }
+
+    /// Goes a `length` from a point of the tissue in a unit direction, keeping to the tissue. Calls `arrive` for each
+    /// place where the way bends, then for its end.
+    ///
+    /// Straight lines between these places stay within `tolerance` of the way. On a bent surface, the way is straight
+    /// along it, and may end early at its border; `arrive` is not called if there is no way in this direction. In other
+    /// tissues, and from a point that lies on no [facet](TissuePoint::facet), the way doesn't bend, and ends at the point
+    /// nearest to its straight end.
+    fn walk(
+        &self,
+        from: &TissuePoint,
+        direction: Vec3,
+        length: f32,
+        _tolerance: f32,
+        arrive: &mut dyn FnMut(TissuePoint),
+    ) {
+        arrive(self.closest_point(from.position + direction * length));
+    }
 
     /// Distance of a point from the border of an area or a volume: positive inside, negative outside.
     ///
@@ -172,5 +214,13 @@ impl dyn Tissue + '_ {
     /// The tissue in force at a growth step, counted from 1: itself, unless it changes in [stages](Tissue::stage).
     pub fn at_step(&self, step: u32) -> &dyn Tissue {
         self.stage(step).unwrap_or(self)
+    }
+
+    /// A position that is kept as it is, with the normal at the nearest point, and with its facet if the tissue contains
+    /// it.
+    pub(crate) fn point_at(&self, position: Vec3) -> TissuePoint {
+        let closest = self.closest_point(position);
+        let facet = closest.facet.filter(|_| self.contains(position));
+        TissuePoint { position, facet, ..closest }
     }
 }

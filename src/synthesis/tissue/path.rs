@@ -198,7 +198,7 @@ impl GuidePath {
     fn on_base(&self, point: Vec3) -> TissuePoint {
         match &self.base {
             Some(base) => base.closest_point(point),
-            None => TissuePoint { position: point, normal: Vec3::ZERO },
+            None => TissuePoint::new(point, Vec3::ZERO),
         }
     }
 }
@@ -222,11 +222,34 @@ impl Tissue for GuidePath {
 
     /// The nearest point of the tube around the line; if it tapers, from the nearest place on the line.
     fn closest_point(&self, point: Vec3) -> TissuePoint {
-        let Some(foot) = self.foot(point) else { return TissuePoint { position: point, normal: Vec3::ZERO } };
+        let Some(foot) = self.foot(point) else { return TissuePoint::new(point, Vec3::ZERO) };
         let offset = (point - foot.position).clamp_length_max(self.deviation(foot.share));
         let found = self.on_base(foot.position + offset);
         // If the tissue below bends away, the line itself is always near enough.
         if self.contains(found.position) { found } else { self.on_base(foot.position) }
+    }
+
+    fn has_facets(&self) -> bool {
+        self.base.as_ref().is_some_and(|base| base.has_facets())
+    }
+
+    /// Towards the point of the tube nearest to the straight end, along the tissue that the guide is laid on.
+    fn walk(
+        &self,
+        from: &TissuePoint,
+        direction: Vec3,
+        length: f32,
+        tolerance: f32,
+        arrive: &mut dyn FnMut(TissuePoint),
+    ) {
+        let end = self.closest_point(from.position + direction * length);
+        let Some(base) = self.base.as_ref().filter(|_| from.facet.is_some()) else { return arrive(end) };
+        let (direction, length) = (end.position - from.position).normalize_and_length();
+        let mut last = None;
+        base.walk(from, direction, length, tolerance, &mut |place| {
+            last.replace(place).into_iter().for_each(&mut *arrive);
+        });
+        last.map(|place| self.closest_point(place.position)).into_iter().for_each(arrive);
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {

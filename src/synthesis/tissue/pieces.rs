@@ -11,6 +11,8 @@ pub struct TissuePiece {
     pub reach: f32,
     /// Length, area or volume of the piece.
     pub measure: f32,
+    /// Normal of the [facet](super::Facet) that it is a piece of; zero in a tissue without any.
+    pub side: Vec3,
     /// The tissue's own identifier of the piece, for [`Tissue::point_of`](super::Tissue::point_of).
     pub id: [u32; 2],
 }

@@ -1,17 +1,28 @@
 //! The surface of an organ's mesh as a tissue.
 
 use crate::synthesis::{
-    mesh::{IndexedMesh, SurfacePoint, TriangleIndex, TriangleMesh},
+    mesh::{
+        IndexedMesh, SurfacePoint, TriangleIndex, TriangleMesh, doubled_normal,
+        facing::inward_triangles,
+        way::{Neighbours, Start, go},
+    },
     pace::{Pace, at_once},
     random::{VesselRng, alias_table::AliasTable, many},
-    tissue::{Extent, Tissue, TissuePiece, TissuePoint, error::TissueError, pieces},
+    tissue::{
+        Extent, Facet, Tissue, TissuePiece, TissuePoint,
+        error::{TissueError, rounding_within},
+        pieces,
+    },
 };
-use bevy_math::{Vec3, bounding::Aabb3d};
+use bevy_math::{DVec3, Vec3, bounding::Aabb3d};
 use rand::RngExt;
 use std::sync::Arc;
 
 /// Distance from the surface, relative to the longest side of its box, within which a point counts as on it.
 pub const SURFACE_TOLERANCE: f32 = 1.0e-5;
+
+/// Most pieces that a surface is cut into, for each square of the reach and each triangle.
+const MOST_PIECES: f64 = 8.0;
 
 /// The triangles of a mesh, sampled uniformly by area.
 ///
@@ -19,10 +30,13 @@ pub const SURFACE_TOLERANCE: f32 = 1.0e-5;
 #[derive(Clone, Debug)]
 pub struct MeshSurface {
     indexed: IndexedMesh,
-    /// Unit normal of every vertex, pointing out of a closed mesh.
+    /// Unit normal of every vertex, pointing outwards.
     normals: Vec<Vec3>,
-    /// −1 where the mesh as a whole faces inwards.
-    facing: f32,
+    /// The triangles that make up the surface: none twice, and all with an area.
+    faces: Vec<u32>,
+    /// Triangles whose corners are clockwise seen from outside.
+    inward: Vec<bool>,
+    neighbours: Neighbours,
     picks: AliasTable,
     bounds: Aabb3d,
     area: f32,
@@ -32,11 +46,11 @@ pub struct MeshSurface {
 impl MeshSurface {
     /// Prepares a mesh.
     ///
-    /// Vertices at the same position share a normal. A closed mesh that faces inwards as a whole is treated as facing
-    /// outwards, so that vessels are lifted off its outside.
+    /// Vertices at the same position share a normal. A triangle that repeats another one counts once, also with its
+    /// other side. A shell that faces inwards is treated as facing outwards, so that vessels are lifted off its outside.
     ///
     /// # Errors
-    /// None for a [`TriangleMesh`], which is checked; the result type is that of every tissue.
+    /// A mesh so far from the origin that its coordinates hold too little of its shape.
     pub fn new(mesh: impl Into<Arc<TriangleMesh>>) -> Result<Self, TissueError> {
         at_once(Self::new_paced(mesh, &Pace::default()))
     }
@@ -46,24 +60,33 @@ impl MeshSurface {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub async fn new_paced(mesh: impl Into<Arc<TriangleMesh>>, pace: &Pace) -> Result<Self, TissueError> {
-        let indexed = IndexedMesh::new_paced(mesh.into(), &pace.part(0.0..0.5)).await;
-        let mesh = indexed.mesh();
-        let bounds = mesh.bounds_paced(&pace.part(0.5..0.52)).await;
-        let faces_inwards = mesh.signed_volume_paced(&pace.part(0.52..0.55)).await < 0.0
-            && mesh.topology_paced(&pace.part(0.55..0.6)).await.is_closed_paced(&pace.part(0.6..0.61)).await;
-        let facing = if faces_inwards { -1.0 } else { 1.0 };
-        let welding = mesh.weld_paced(&pace.part(0.61..0.7)).await;
-        let mut normals = mesh.vertex_normals_paced(&welding, &pace.part(0.7..0.85)).await;
-        let vertices = normals.len();
-        pace.part(0.85..0.87).each(vertices, |vertex| normals[vertex] *= facing).await;
-        let area = |triangle| if mesh.is_degenerate(triangle) { 0.0 } else { mesh.triangle_area(triangle) };
-        let areas: Vec<f64> = pace.part(0.87..0.9).collect(mesh.triangles().len(), area).await;
+        let mesh: Arc<TriangleMesh> = mesh.into();
+        let bounds = mesh.bounds_paced(&pace.part(0.0..0.02)).await;
+        let rounding = rounding_within(&bounds)?;
+        let welding = mesh.weld_paced(&pace.part(0.02..0.07)).await;
+        let faces = mesh.faces_paced(&welding, &pace.part(0.07..0.15)).await;
+        let indexed = IndexedMesh::of_paced(Arc::clone(&mesh), &faces, &pace.part(0.15..0.45)).await;
+        let topology = mesh.topology_of_paced(welding, &faces, &pace.part(0.45..0.55)).await;
+        let inward = inward_triangles(&mesh, &topology, indexed.index(), &pace.part(0.55..0.75)).await;
+        let neighbours = Neighbours::new_paced(&mesh, &topology, &pace.part(0.75..0.8)).await;
+        let mut areas = vec![0.0; mesh.triangles().len()];
+        let measure = |face: usize| areas[faces[face] as usize] = mesh.triangle_area(faces[face] as usize);
+        pace.part(0.8..0.82).each(faces.len(), measure).await;
+        // Twice the area along the normal, as for the mesh itself; nothing for triangles that are no faces.
+        let normal = |triangle: usize| match (areas[triangle] > 0.0, inward[triangle]) {
+            (false, _) => DVec3::ZERO,
+            (true, false) => doubled_normal(mesh.corners(triangle)),
+            (true, true) => -doubled_normal(mesh.corners(triangle)),
+        };
+        let normals = mesh.vertex_normals_paced(topology.welding(), normal, &pace.part(0.82..0.9)).await;
         Ok(Self {
             normals,
-            facing,
+            faces,
+            inward,
+            neighbours,
             area: pace.part(0.9..0.91).sum(areas.len(), |triangle| areas[triangle]).await as f32,
             picks: AliasTable::new_paced(areas.len(), |triangle| areas[triangle], &pace.part(0.91..1.0)).await,
-            tolerance: (bounds.max - bounds.min).max_element() * SURFACE_TOLERANCE,
+            tolerance: ((bounds.max - bounds.min).max_element() * SURFACE_TOLERANCE).max(rounding),
             bounds,
             indexed,
         })
@@ -87,7 +110,7 @@ impl MeshSurface {
     /// Unit normal at a point of the mesh: that of the vertices, interpolated; the triangle's own if those cancel out
     /// or point to its other side.
     pub fn normal_at(&self, point: &SurfacePoint) -> Vec3 {
-        let own = self.mesh().triangle_normal(point.triangle) * self.facing;
+        let own = self.triangle_normal(point.triangle);
         let corners = self.mesh().triangles()[point.triangle].map(|vertex| self.normals[vertex as usize]);
         let weights = point.barycentric;
         let smooth = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
@@ -99,6 +122,12 @@ impl MeshSurface {
 }
 
 impl MeshSurface {
+    /// Unit normal of a triangle, outwards.
+    fn triangle_normal(&self, triangle: usize) -> Vec3 {
+        let normal = self.mesh().triangle_normal(triangle);
+        if self.inward[triangle] { -normal } else { normal }
+    }
+
     /// Number of parts into which a triangle's sides are cut so that no small triangle exceeds `reach`.
     fn parts(&self, triangle: usize, reach: f32) -> u32 {
         let [a, b, c] = self.mesh().corners(triangle);
@@ -107,15 +136,17 @@ impl MeshSurface {
         pieces::parts(longest, 1.5 * reach)
     }
 
+    fn tissue_point(&self, point: &SurfacePoint) -> TissuePoint {
+        let facet = Facet { number: point.triangle as u32, normal: self.triangle_normal(point.triangle) };
+        TissuePoint { position: point.position, normal: self.normal_at(point), facet: Some(facet) }
+    }
+
     /// The point chosen by four uniform numbers: one for a slot of the table, one for keeping it, and two in the
     /// triangle.
     fn pick(&self, slot: u32, keep: f32, numbers: [f32; 2]) -> Vec3 {
-        self.point_in(self.picks.pick(slot, keep) as usize, numbers)
-    }
-
-    /// The point of a triangle chosen by two uniform numbers.
-    fn point_in(&self, triangle: usize, [mut v, mut w]: [f32; 2]) -> Vec3 {
+        let triangle = self.picks.pick(slot, keep) as usize;
         let [a, b, c] = self.mesh().corners(triangle);
+        let [mut v, mut w] = numbers;
         // Uniform over the parallelogram, with its far half folded back.
         if v + w > 1.0 {
             (v, w) = (1.0 - v, 1.0 - w);
@@ -139,10 +170,33 @@ impl Tissue for MeshSurface {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         match self.index().closest(point) {
-            Some(found) => TissuePoint { position: found.position, normal: self.normal_at(&found) },
+            Some(found) => self.tissue_point(&found),
             // Only a point that is not finite has no closest one.
-            None => TissuePoint { position: point, normal: Vec3::ZERO },
+            None => TissuePoint::new(point, Vec3::ZERO),
         }
+    }
+
+    fn has_facets(&self) -> bool {
+        true
+    }
+
+    fn walk(
+        &self,
+        from: &TissuePoint,
+        direction: Vec3,
+        length: f32,
+        tolerance: f32,
+        arrive: &mut dyn FnMut(TissuePoint),
+    ) {
+        let Some(facet) = from.facet else {
+            arrive(self.closest_point(from.position + direction * length));
+            return;
+        };
+        let start = Start { position: from.position, triangle: facet.number, direction };
+        let mesh = (self.mesh(), self.index(), &self.neighbours);
+        go(mesh, start, length, tolerance, |position, triangle| {
+            arrive(self.tissue_point(&SurfacePoint::on(self.mesh(), triangle as usize, position)));
+        });
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
@@ -162,9 +216,16 @@ impl Tissue for MeshSurface {
         }
     }
 
-    /// Triangles whose sides are too long for `reach` are cut into k² equal ones, by lines along their sides.
+    /// Triangles whose sides are too long for `reach` are cut into k² equal ones, by lines along their sides. A surface of
+    /// long thin triangles would take far more of these than its area asks for, and is not cut.
     fn cut(&self, reach: f32, pieces: &mut Vec<TissuePiece>) -> bool {
-        for triangle in (0..self.mesh().triangles().len()).filter(|&triangle| !self.mesh().is_degenerate(triangle)) {
+        let squares = |&face: &u32| f64::from(self.parts(face as usize, reach)).powi(2);
+        let asked = f64::from(self.area / (reach * reach)) + self.faces.len() as f64;
+        if self.faces.iter().map(squares).sum::<f64>() > MOST_PIECES * asked {
+            return false;
+        }
+        for &face in &self.faces {
+            let (triangle, side) = (face as usize, self.triangle_normal(face as usize));
             let [a, b, c] = self.mesh().corners(triangle);
             let parts = self.parts(triangle, reach);
             let measure = self.mesh().triangle_area(triangle) as f32 / (parts * parts) as f32;
@@ -172,7 +233,7 @@ impl Tissue for MeshSurface {
                 let corners = small_triangle(part, parts).map(|[v, w]| a + (b - a) * v + (c - a) * w);
                 let center = (corners[0] + corners[1] + corners[2]) / 3.0;
                 let reach = corners.iter().map(|corner| corner.distance(center)).fold(0.0, f32::max);
-                pieces.push(TissuePiece { center, reach, measure, id: [triangle as u32, part] });
+                pieces.push(TissuePiece { center, reach, measure, side, id: [face, part] });
             }
         }
         true

@@ -19,7 +19,10 @@ use crate::synthesis::{
     pace::{Pace, SHORT_STRETCH, at_once},
     random::VesselRng,
     space::bvh::Bounds,
-    tissue::{Extent, Tissue, TissuePoint, error::TissueError},
+    tissue::{
+        Extent, Tissue, TissuePoint,
+        error::{TissueError, rounding_within},
+    },
 };
 use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
 use rand::RngExt;
@@ -73,7 +76,13 @@ impl MeshVolume {
     /// Most draws for a sample. More than a tenth of the space of the sampled voxels is inside.
     const TRIES: u32 = 128;
     /// Depths to which a point is brought inside, in voxels: the first that is inside is used.
-    const DEPTHS: [f64; 4] = [0.01, 0.05, 0.2, 0.5];
+    const DEPTHS: [f64; 6] = [0.01, 0.05, 0.2, 0.5, 0.001, 0.0001];
+    /// Voxels around a point in which it is searched for the inside where no direction leads in, along each axis and way.
+    const AROUND: i32 = 3;
+    /// Points that are tried along each side of one of these.
+    const SIEVE: i32 = 4;
+    /// Least share of the voxels that are inside or touched which the inside must fill: with less, samples miss it.
+    const LEAST_SHARE: f64 = 1.0 / 128.0;
 
     /// Voxelises a mesh with `resolution` voxels along the longest side of its box.
     ///
@@ -93,6 +102,7 @@ impl MeshVolume {
     /// Those of [`new`](Self::new).
     pub async fn new_paced(mesh: &TriangleMesh, resolution: u32, pace: &Pace) -> Result<Self, TissueError> {
         let bounds = mesh.bounds_paced(&pace.part(0.0..0.01)).await;
+        rounding_within(&bounds)?;
         let grid = Grid::over(&bounds, resolution)?;
         let mesh = mesh.welded_paced(&pace.part(0.01..0.1)).await;
         let index = TriangleIndex::new_paced(&mesh, &pace.part(0.1..0.25)).await;
@@ -120,7 +130,15 @@ impl MeshVolume {
             triangles,
         };
         volume.volume = volume.measure(&pace.part(0.89..1.0)).await;
-        if volume.volume > 0.0 { Ok(volume) } else { Err(TissueError::NoInside { resolution }) }
+        let voxels = (volume.whole.len() + volume.touched_voxels()) as f64 * volume.grid.cell().powi(3);
+        let share = f64::from(volume.volume) / voxels;
+        if !(volume.volume > 0.0) {
+            Err(TissueError::NoInside { resolution })
+        } else if share < Self::LEAST_SHARE {
+            Err(TissueError::TooThin { share: share as f32, resolution })
+        } else {
+            Ok(volume)
+        }
     }
 
     /// Length of a voxel's side, in tissue lengths.
@@ -202,7 +220,27 @@ impl MeshVolume {
             [inwards, onwards, inwards + corner_to_middle, -inwards]
                 .map(|direction| (on + direction * (depth * self.grid.cell())).as_vec3())
         });
-        candidates.into_iter().find(|&candidate| self.contains(candidate)).or_else(|| self.nearest_whole(on.as_vec3()))
+        let candidate = candidates.into_iter().find(|&candidate| self.contains(candidate));
+        candidate.or_else(|| self.nearest_around(on.as_vec3())).or_else(|| self.nearest_whole(on.as_vec3()))
+    }
+
+    /// The nearest of a sieve of points around one that are inside: next to edges where more than two triangles meet, and
+    /// in sheets.
+    fn nearest_around(&self, point: Vec3) -> Option<Vec3> {
+        let spacing = 1.0 / f64::from(Self::SIEVE);
+        let first = ((self.grid.local(point) / spacing).floor() + 0.5) * spacing;
+        let reach = Self::AROUND * Self::SIEVE;
+        let line = || -reach..=reach;
+        let offsets = line().flat_map(|x| line().flat_map(move |y| line().map(move |z| [x, y, z].map(f64::from))));
+        let at = |offset: [f64; 3]| self.grid.global(first + DVec3::from_array(offset) * spacing);
+        let mut nearest: Option<(f32, Vec3)> = None;
+        for candidate in offsets.map(at) {
+            let distance = candidate.distance_squared(point);
+            if nearest.is_none_or(|(least, _)| distance < least) && self.contains(candidate) {
+                nearest = Some((distance, candidate));
+            }
+        }
+        nearest.map(|(_, candidate)| candidate)
     }
 
     /// Centre of the nearest voxel that is inside as a whole, for points near a flap that encloses nothing.
@@ -236,7 +274,7 @@ impl Tissue for MeshVolume {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         let position = if self.contains(point) { point } else { self.bring_in(point).unwrap_or(point) };
-        TissuePoint { position, normal: Vec3::ZERO }
+        TissuePoint::new(position, Vec3::ZERO)
     }
 
     fn depth(&self, point: Vec3) -> Option<f32> {

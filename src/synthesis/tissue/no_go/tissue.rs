@@ -56,6 +56,21 @@ impl Tissue for NoGoTissue {
         self.tissue.closest_point(point)
     }
 
+    fn has_facets(&self) -> bool {
+        self.tissue.has_facets()
+    }
+
+    fn walk(
+        &self,
+        from: &TissuePoint,
+        direction: Vec3,
+        length: f32,
+        tolerance: f32,
+        arrive: &mut dyn FnMut(TissuePoint),
+    ) {
+        self.tissue.walk(from, direction, length, tolerance, arrive);
+    }
+
     fn depth(&self, point: Vec3) -> Option<f32> {
         self.tissue.depth(point)
     }

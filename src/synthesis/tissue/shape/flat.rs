@@ -88,7 +88,7 @@ impl Tissue for Disc {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         let position = self.at(self.local(point).0.clamp_length_max(self.radius));
-        TissuePoint { position, normal: self.normal }
+        TissuePoint::new(position, self.normal)
     }
 
     fn depth(&self, point: Vec3) -> Option<f32> {
@@ -122,7 +122,7 @@ impl Tissue for Disc {
             let reach = corner.max(inner_corner).max(outer - middle).max(middle - inner);
             for sector in 0..sectors {
                 let center = self.at(middle * direction(half * (2 * sector + 1) as f32));
-                pieces.push(TissuePiece { center, reach, measure, id: [ring, sector] });
+                pieces.push(TissuePiece { center, reach, measure, side: Vec3::ZERO, id: [ring, sector] });
             }
         }
         true
@@ -224,7 +224,7 @@ impl Tissue for Rectangle {
     }
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
-        TissuePoint { position: self.nearest(point), normal: self.normal() }
+        TissuePoint::new(self.nearest(point), self.normal())
     }
 
     fn depth(&self, point: Vec3) -> Option<f32> {
@@ -243,7 +243,8 @@ impl Tissue for Rectangle {
         for y in 0..counts.y {
             for x in 0..counts.x {
                 let center = self.at((UVec2::new(x, y).as_vec2() + 0.5) * part - self.half);
-                pieces.push(TissuePiece { center, reach: 0.5 * part.length(), measure: part.x * part.y, id: [x, y] });
+                let (reach, measure) = (0.5 * part.length(), part.x * part.y);
+                pieces.push(TissuePiece { center, reach, measure, side: Vec3::ZERO, id: [x, y] });
             }
         }
         true

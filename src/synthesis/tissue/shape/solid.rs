@@ -11,7 +11,7 @@ use std::f32::consts::PI;
 
 /// A point of a solid, where there is no normal.
 fn inside(position: Vec3) -> TissuePoint {
-    TissuePoint { position, normal: Vec3::ZERO }
+    TissuePoint::new(position, Vec3::ZERO)
 }
 
 /// Appends points drawn uniformly from the unit ball, each mapped by `place`.
