@@ -19,7 +19,7 @@ use bevy_vessels::synthesis::{
 use clap::{Parser, ValueEnum};
 use std::io::Write;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Grows arteries and veins in organs, without a window.
@@ -34,9 +34,12 @@ pub struct Options {
     /// preset's.
     #[arg(long)]
     pub mode: Option<Mode>,
-    /// Built-in settings, by name.
-    #[arg(long, default_value_t, conflicts_with = "settings", value_name = "NAME")]
-    pub preset: PresetName,
+    /// How vessels grow. Without a preset or settings it chooses those to start from.
+    #[arg(long)]
+    pub method: Option<Method>,
+    /// Built-in settings, by name. Default: `paper`; with `--method cco` it is `cco-disc` in a disc, else `cco-ball`.
+    #[arg(long, conflicts_with = "settings", value_name = "NAME")]
+    pub preset: Option<PresetName>,
     /// Your own preset, as a RON file.
     #[arg(long, value_name = "FILE.ron")]
     pub settings: Option<PathBuf>,
@@ -49,6 +52,9 @@ pub struct Options {
     /// Samples drawn from the tissue in each step. Default: the preset's.
     #[arg(long)]
     pub samples: Option<u32>,
+    /// Terminals of each kind of vessels, for constrained constructive optimisation. Default: the preset's.
+    #[arg(long, value_name = "N")]
+    pub terminals: Option<u32>,
     /// Multiplies every length of the settings, after fitting them to the tissue.
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     pub lengths: f32,
@@ -85,6 +91,34 @@ pub struct Options {
     /// Prints one line of JSON per organ, with the figures of its closed meshes if these are made.
     #[arg(long)]
     pub json: bool,
+}
+
+/// How vessels grow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Method {
+    /// By space colonization: arteries and veins.
+    Colonization,
+    /// By constrained constructive optimisation: trees of least volume, in areas and volumes with a border.
+    Cco,
+}
+
+impl Method {
+    /// The settings to start from if none are named.
+    fn preset(self, tissue: &Path) -> PresetName {
+        match self {
+            Self::Colonization => PresetName::default(),
+            Self::Cco if tissue == "disc" => PresetName::CcoDisc,
+            Self::Cco => PresetName::CcoBall,
+        }
+    }
+
+    /// Whether settings grow vessels this way.
+    fn is_of(self, generator: &Generator) -> bool {
+        match self {
+            Self::Colonization => generator.colonization().is_some(),
+            Self::Cco => generator.cco().is_some(),
+        }
+    }
 }
 
 /// A share of the organs.
@@ -218,6 +252,12 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
     if let Some(samples) = options.samples {
         colonization(&mut preset, "--samples")?.samples = samples;
     }
+    if let Some(terminals) = options.terminals {
+        let settings = preset.generator.cco_mut();
+        settings
+            .ok_or_else(|| Failure::usage("--terminals is for --method cco; the preset grows otherwise"))?
+            .terminals = terminals;
+    }
     if options.no_veins {
         preset.roots.vein = RootPlacement::None;
     }
@@ -267,8 +307,23 @@ fn colonization<'a>(preset: &'a mut Preset, option: &str) -> Result<&'a mut Colo
 }
 
 fn read_preset(options: &Options) -> Result<(Preset, String), Failure> {
+    let (preset, name) = find_preset(options)?;
+    match options.method {
+        Some(method) if !method.is_of(&preset.generator) => {
+            let wanted = method.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+            Err(Failure::Usage(format!(
+                "--method {wanted} conflicts with {name}, which grows otherwise; leave out one of them"
+            )))
+        }
+        _ => Ok((preset, name)),
+    }
+}
+
+fn find_preset(options: &Options) -> Result<(Preset, String), Failure> {
     let Some(path) = &options.settings else {
-        return Ok((options.preset.load(), options.preset.name().to_owned()));
+        let by_method = || options.method.unwrap_or(Method::Colonization).preset(&options.tissue);
+        let preset = options.preset.unwrap_or_else(by_method);
+        return Ok((preset.load(), preset.name().to_owned()));
     };
     let named = |cause: &dyn std::fmt::Display| Failure::Run(format!("{}: {cause}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| named(&error))?;
@@ -297,8 +352,11 @@ fn build_tissue(options: &Options, preset: &mut Preset) -> Result<Arc<dyn Tissue
                 _ => MeshTissue::default(),
             };
             if let Some(mode) = mode {
-                let steps = colonization(preset, "--mode")?.steps;
+                let steps = preset.generator.colonization().map_or(0, |settings| settings.steps);
                 tissue.mode = mode.tissue_mode(tissue.mode, steps);
+            } else if preset.generator.cco().is_some() {
+                // The only mode in which it can grow.
+                tissue.mode = TissueMode::Volume;
             }
             preset.tissue = tissue.into();
             let mesh = load_mesh(&options.tissue).map_err(|error| match error {

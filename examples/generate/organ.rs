@@ -1,14 +1,16 @@
 //! One organ: grown, measured, written.
 
 use super::mesh::{Meshed, meshes, save};
-use super::report::{KindMeasures, Line};
+use super::report::{CcoFigures, KindMeasures, Line};
 use super::{Failure, Format, Job};
 use bevy_vessels::synthesis::{
+    cco::Cco,
     growth::{Growth, StepCount},
     io::{ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc, swc_structure},
     roots::Roots,
     tree::{ByKind, VesselKind, VesselTree, hash_trees},
 };
+use std::any::Any;
 use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
@@ -42,6 +44,9 @@ impl<'a> Grower<'a> {
             after_step(growth.progress());
         }
         growth.settle();
+        if let Some(cco) = (growth as &dyn Any).downcast_ref::<Cco>() {
+            cco.outcome().map_err(|error| named(&error))?;
+        }
         let grow_ms = 1e3 * start.elapsed().as_secs_f64();
         let hash = hash_trees(growth.trees().values().flatten().map(|grown| grown.tree));
         let meshes = meshes(self.job, growth).map_err(|error| named(&error))?;
@@ -55,6 +60,7 @@ impl<'a> Grower<'a> {
             grow_ms: (grow_ms * 1e3).round() / 1e3,
             hash: format!("{hash:016x}"),
             kinds: KindMeasures::of(growth, &*self.job.tissue, seed, &measured),
+            cco: CcoFigures::of(growth),
             files: write_files(self.job, growth, &meshes, seed, hash)?,
         })
     }

@@ -165,12 +165,12 @@ impl Space {
         debug_assert!(node.parent != NONE);
         let joint = Joint {
             ends: [forest.place(node.parent), node.at.as_dvec3(), point],
-            flows: [node.flow, 1.0],
+            flows: [node.flow, self.share],
             below: [node.below(forest.exponent), Below::default()],
             exponent: forest.exponent,
         };
         let start = joint.start();
-        let (volume, slope) = paths.ascend(forest, segment, joint.sums(start).trunk);
+        let (volume, slope) = paths.ascend(forest, segment, joint.sums(start).trunk, self.share);
         let before = forest.node(self.root_segment(node.tree)).sums.volume;
         let bound = volume - before - PROMISE * joint.promise(start, &slope);
         Guess { segment, joint, slope, bound: if bound.is_finite() { bound } else { f64::NEG_INFINITY } }
@@ -183,7 +183,7 @@ impl Space {
         // Rounded, as it will be kept.
         let place = joint.settle(joint.start(), slope, tolerance).as_vec3().as_dvec3();
         let sums = joint.sums(place);
-        let ascent = forest.ascend(*segment, sums.trunk, 1.0);
+        let ascent = forest.ascend(*segment, sums.trunk, self.share);
         let trunk = self.unit[node.tree as usize] * ascent.root.load * ascent.thinning;
         let child = |child: usize| trunk * sums.children[child].load / sums.below.load;
         // 2r ≤ l, as fourth powers.

@@ -82,13 +82,14 @@ impl Space {
 
     /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room for
     /// radii that are `reserve` times as wide.
-    fn clear(&mut self, segment: u32, reserve: f64) -> bool {
+    pub(super) fn clear(&mut self, segment: u32, reserve: f64) -> bool {
         let radius = self.radius(segment);
         let parent = self.forest.node(segment).parent;
         let ends = [self.forest.place(parent), self.forest.place(segment)];
         let is_entrance = self.forest.node(parent).parent == NONE;
         let mut bound = SLACK * radius;
-        if !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
+        let is_given = segment < self.given && parent < self.given;
+        if !is_given && !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
             bound = radius * APART;
             if !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
                 return false;
@@ -132,6 +133,32 @@ impl Space {
         }
         self.tightened = tightened;
         has_room
+    }
+
+    /// Number of pairs of segments that overlap without a common node.
+    pub(super) fn overlaps(&self) -> usize {
+        let segments = || (0..self.forest.nodes.len() as u32).filter(|&node| self.forest.node(node).parent != NONE);
+        let ends = |segment: u32| [self.forest.place(self.forest.node(segment).parent), self.forest.place(segment)];
+        let radii: Vec<f64> = (0..self.forest.nodes.len() as u32)
+            .map(|node| if self.forest.node(node).parent == NONE { 0.0 } else { self.radius(node) })
+            .collect();
+        let mut pairs = Vec::new();
+        for segment in segments() {
+            let [from, to] = ends(segment);
+            let radius = radii[segment as usize];
+            self.index.near(from, to, radius, |other| {
+                let sum = radius + radii[other as usize];
+                let is_pair = other < segment && !self.forest.are_incident(segment, other);
+                if is_pair && squared_between([from, to], ends(other)) < sum * sum {
+                    pairs.push((segment, other));
+                }
+                true
+            });
+        }
+        // Some may be visited twice.
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs.len()
     }
 
     /// Carries the strain of a changed segment up to the root. All radii on the way have changed.

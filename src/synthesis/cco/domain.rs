@@ -4,7 +4,7 @@
 //! than the way between two points, so a value at a centre bounds those around it from both sides; only where the bound
 //! does not decide, near the border, the mesh is asked.
 
-use super::error::CcoError;
+use super::{error::CcoError, power::cube_root, settings::CcoSettings};
 use crate::synthesis::{
     parallel,
     tissue::{Extent, Tissue},
@@ -34,8 +34,9 @@ pub(super) struct Domain {
     pub axes: [DVec3; 3],
     /// Sides of that box; the last is 0 for an area.
     pub sides: DVec3,
-    border: f64,
-    grid: Option<DepthGrid>,
+    /// Distance that vessels keep from the border.
+    pub border: f64,
+    grid: Option<Arc<DepthGrid>>,
 }
 
 /// Depths at the centres of cells.
@@ -48,11 +49,11 @@ struct DepthGrid {
 }
 
 impl Domain {
-    /// A tissue whose vessels keep so far from its border.
+    /// A tissue whose vessels may touch its border.
     ///
     /// # Errors
     /// A tissue without an inside.
-    pub(super) fn new(tissue: Arc<dyn Tissue>, border: f32) -> Result<Self, CcoError> {
+    pub(super) fn new(tissue: Arc<dyn Tissue>) -> Result<Self, CcoError> {
         if tissue.stage(1).is_some() {
             return Err(CcoError::NoInside { tissue: "a tissue in stages" });
         }
@@ -91,17 +92,33 @@ impl Domain {
             sides.z = 0.0;
         }
         let corner = axes[0] * low.x + axes[1] * low.y + axes[2] * low.z;
-        let grid = tissue.depth_is_searched().then(|| DepthGrid::new(&*tissue, min, max));
-        Ok(Self { tissue, dimension, measure, corner, axes, sides, border: border.into(), grid })
+        let grid = tissue.depth_is_searched().then(|| Arc::new(DepthGrid::new(&*tissue, min, max)));
+        Ok(Self { tissue, dimension, measure, corner, axes, sides, border: 0.0, grid })
     }
 
     pub(super) fn tissue(&self) -> &Arc<dyn Tissue> {
         &self.tissue
     }
 
+    /// Millimetres of a tissue length, if the whole tissue has its physical size.
+    pub(super) fn millimetres(&self, settings: &CcoSettings) -> f64 {
+        let share = f64::from(settings.perfusion) / self.measure;
+        if self.dimension == 2 { share.sqrt() } else { cube_root(share) }
+    }
+
     /// The diagonal of the tissue's box.
     pub(super) fn diagonal(&self) -> f64 {
         self.sides.length()
+    }
+
+    /// Density of terminals at a point, from 0 to 1.
+    pub(super) fn density(&self, point: DVec3) -> f64 {
+        self.tissue.density(point.as_vec3()).into()
+    }
+
+    /// Whether that is 1 everywhere.
+    pub(super) fn is_uniform(&self) -> bool {
+        self.tissue.is_uniform()
     }
 
     fn searched(&self, point: DVec3) -> f64 {

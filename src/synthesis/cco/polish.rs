@@ -11,10 +11,10 @@ const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
 const STILL: f64 = 1.0e-4;
 
 impl Space {
-    /// Moves a node, if it is a bifurcation and the tree becomes smaller. Returns whether it moved.
+    /// Moves a node, if it is a bifurcation that was not given and the tree becomes smaller. Returns whether it moved.
     pub(super) fn polish(&mut self, node: u32, tolerance: f64) -> bool {
         let (forest, own) = (&self.forest, self.forest.node(node));
-        if own.parent == NONE || own.is_terminal() {
+        if own.parent == NONE || own.children[1] == NONE || node < self.given {
             return false;
         }
         let children = own.children;
