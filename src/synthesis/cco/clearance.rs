@@ -73,6 +73,8 @@ impl Space {
             let fits = self.clear(segment, 1.0);
             if fits {
                 self.strain_from(segment);
+            } else {
+                self.blocked = Some(segment);
             }
             fits
         });
@@ -90,7 +92,7 @@ impl Space {
         let mut bound = SLACK * radius;
         let is_given = segment < self.given && parent < self.given;
         if !is_given && !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
-            bound = radius * APART;
+            bound = radius * reserve.max(APART);
             if !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
                 return false;
             }

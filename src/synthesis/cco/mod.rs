@@ -32,6 +32,7 @@ mod links;
 mod paths;
 mod polish;
 mod power;
+mod relief;
 mod report;
 mod seam;
 mod settings;

@@ -27,6 +27,8 @@ pub(super) struct Space {
     pub given: u32,
     /// Factor of the radii for which new segments must have room: what they are expected to grow by.
     pub reserve: f64,
+    /// The last segment that had to become wider and had no room, of those before a change.
+    pub blocked: Option<u32>,
     /// Nodes as they were before a change, in the order in which they were changed.
     pub(super) before: Vec<(u32, Node)>,
     /// Number of nodes before the change.
@@ -54,6 +56,7 @@ impl Space {
             share: 1.0,
             given: 0,
             reserve: 1.0,
+            blocked: None,
             before: Vec::new(),
             nodes_before: 0,
             moved: Vec::new(),

@@ -42,6 +42,8 @@ pub(super) struct System {
     candidates: Candidates,
     /// Excess of the next terminal's flow over the mean, if that is decided, in units.
     excess: Option<f64>,
+    /// Segments that no move gives room.
+    stuck: Vec<u32>,
     /// 8µQ/(πk·ΔP·s³): the unit of a radius's fourth power once the domain has its full size.
     unit: f64,
 }
@@ -64,6 +66,7 @@ impl System {
             vacancy: Vacancy::new(domain, settings.terminals),
             candidates: Candidates::default(),
             excess: None,
+            stuck: Vec::new(),
             unit,
         }
     }
@@ -181,6 +184,7 @@ impl System {
             (space.unit[self.trees[0] as usize], self.unit_at(&space.domain, self.terminals + 1, settings));
         self.set_unit(space, unit);
         space.share = self.share(settings, rng);
+        space.blocked = None;
         space.index.coarsen(self.vacancy.threshold());
         let share = f64::from(self.terminals) / f64::from(settings.terminals);
         space.reserve = 1.0 + RESERVE * (1.0 - share);
@@ -190,11 +194,20 @@ impl System {
             return true;
         }
         self.set_unit(space, old);
+        self.relieve(space);
         self.vacancy.refuse();
         self.rejected += 1;
         self.refused += 1;
         self.is_stuck = self.refused >= MOST_REFUSED;
         false
+    }
+
+    /// Makes room around the segment that was in the way of the last terminal, unless that was in vain before.
+    fn relieve(&mut self, space: &mut Space) {
+        let Some(segment) = space.blocked.filter(|segment| !self.stuck.contains(segment)) else { return };
+        if !space.relieve(segment) {
+            self.stuck.push(segment);
+        }
     }
 
     fn join(&mut self, space: &mut Space, place: DVec3, settings: &CcoSettings) -> bool {

@@ -33,7 +33,7 @@ impl MaskBorder {
                     is_last || !is_set(beside())
                 };
                 // Faces beside each other along x are one.
-                let goes_on = |&a: &u32, &b: &u32| axis > 0 && b == a + 1 && b as usize % size[0] != 0;
+                let goes_on = |&a: &u32, &b: &u32| axis > 0 && b == a + 1 && !(b as usize).is_multiple_of(size[0]);
                 let open: Vec<u32> = set.iter().copied().filter(|&cell| is_open(cell as usize)).collect();
                 for run in open.chunk_by(goes_on) {
                     let mut ends = [Vec3::ZERO, Vec3::ONE];
