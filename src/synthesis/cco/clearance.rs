@@ -100,13 +100,19 @@ impl Space {
         let mut tightened = std::mem::take(&mut self.tightened);
         tightened.clear();
         let mut has_room = true;
+        let (middle, half) = (ends[0].midpoint(ends[1]), 0.5 * ends[0].distance(ends[1]));
         self.index.near(ends[0], ends[1], bound, |other| {
+            let node = self.forest.node(other);
+            let sum = bound + f64::from(node.bound);
+            // Most are too far away, which one of their ends shows.
+            let reach = half + node.length + sum;
+            if middle.distance_squared(node.at.as_dvec3()) >= reach * reach {
+                return true;
+            }
             if other == segment || self.forest.are_incident(segment, other) {
                 return true;
             }
-            let node = self.forest.node(other);
             let other_ends = [self.forest.place(node.parent), node.at.as_dvec3()];
-            let sum = bound + f64::from(node.bound);
             let square = squared_between(ends, other_ends);
             if square >= sum * sum {
                 return true;

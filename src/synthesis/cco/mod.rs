@@ -20,6 +20,7 @@
 mod candidates;
 mod cell_map;
 mod clearance;
+mod depths;
 mod distance;
 mod domain;
 mod error;

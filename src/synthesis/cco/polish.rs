@@ -29,7 +29,7 @@ impl Space {
         let changed = [node, children[0], children[1]];
         let lengths = changed.map(|segment| forest.node(segment).length);
         let slope = forest.ascend(node, own.sums, 0.0).slope;
-        let best = joint.settle(start, &slope, tolerance);
+        let best = joint.settle(start, &joint.sums(start), &slope, tolerance);
         if best.distance(start) < STILL * lengths.into_iter().fold(f64::MAX, f64::min) {
             return false;
         }

@@ -18,6 +18,8 @@ use rand::RngExt;
 const FALL: f64 = 0.9;
 /// Draws in vain in a row after which the threshold falls.
 const TRIES: u32 = 100;
+/// Neighbours of a cell along an axis, the nearest first, as far as terminals keep apart.
+const OFFSETS: [i64; 19] = [0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8, -8, 9, -9];
 /// Largest distance between terminals, in thresholds: places with less density than belongs to it have no terminals.
 const MOST_APART: f64 = 5.0;
 /// Cells along the longest side of the tissue in which the mean density is measured.
@@ -196,13 +198,13 @@ impl Vacancy {
         let center = self.coordinates(domain, point);
         let square = reach * reach;
         let last = self.size.map(|count| count as i64 - 1);
-        let cells = (reach / self.side).ceil() as i64;
+        let cells = (reach / self.side).ceil() as usize;
         // A cell's own terminal first, which is near in most cases.
-        let offsets = || std::iter::once(0).chain((1..=cells).flat_map(|offset| [offset, -offset]));
-        let layers = if domain.dimension == 2 { 1 } else { usize::MAX };
-        for dz in offsets().take(layers) {
-            for dy in offsets() {
-                for dx in offsets() {
+        let offsets = &OFFSETS[..OFFSETS.len().min(2 * cells + 1)];
+        let layers = if domain.dimension == 2 { &OFFSETS[..1] } else { offsets };
+        for &dz in layers {
+            for &dy in offsets {
+                for &dx in offsets {
                     let cell = [center[0] + dx, center[1] + dy, center[2] + dz];
                     if (0..3).any(|axis| cell[axis] < 0 || cell[axis] > last[axis]) {
                         continue;
