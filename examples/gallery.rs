@@ -7,9 +7,11 @@
 
 mod common;
 
-use bevy::prelude::*;
+use bevy::{math::ops, prelude::*};
+use bevy_panorbit_camera::PanOrbitCamera;
 use bevy_vessels::{
     prelude::*,
+    render::SegmentRenderPlugin,
     synthesis::{
         organ::{LiverSettings, Viewpoint},
         tree::ByKind,
@@ -17,9 +19,9 @@ use bevy_vessels::{
 };
 use clap::Parser;
 use common::{
-    controls::{ControlsPlugin, HELP, OrganAssets},
+    controls::{ControlsPlugin, HELP, Organ, OrganAssets},
     photo::{Shot, Shots},
-    studio::{StudioArgs, StudioPlugin, moved, to_unit_size},
+    studio::{StudioArgs, StudioPlugin, View, moved, to_unit_size},
 };
 
 /// The presets side by side.
@@ -42,15 +44,20 @@ const DISCS: [(&str, PresetName, Option<VesselKind>); 6] = [
     ("larger phi: lateral branches", PresetName::Lateral, Some(VesselKind::Artery)),
 ];
 /// Position of the liver, beside the discs.
-const LIVER: Vec3 = Vec3::new(3.2, 0.0, 0.0);
+const LIVER: Vec3 = Vec3::new(2.4, 0.0, 0.0);
+/// Lowest and highest corner of all discs with their captions and the liver, and room for the texts.
+const EVERYTHING: [Vec3; 2] = [Vec3::new(-1.65, -1.4, -0.2), Vec3::new(2.95, 1.5, 0.2)];
 
 fn main() -> AppExit {
     let args = Args::parse();
+    // With four samples a pixel, lines of a quarter of one are still lines.
+    let segments = SegmentRenderPlugin { least_width: 0.25, ..default() };
     App::new()
         .add_plugins(StudioPlugin { args: args.studio.clone(), title: "Presets", help: HELP, more_help: "" })
-        .add_plugins((VesselPlugin::default(), ControlsPlugin))
+        .add_plugins((VesselPlugin { segments, ..default() }, ControlsPlugin))
         .insert_resource(args)
         .add_systems(Startup, (spawn_discs, spawn_liver).chain())
+        .add_systems(Update, see_everything.run_if(resource_equals(View::Window)))
         .add_systems(PostUpdate, place_captions.after(TransformSystems::Propagate))
         .run()
 }
@@ -75,9 +82,10 @@ fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         assets.spawn(&mut commands, disc, Color::srgb(0.93, 0.87, 0.82), place).insert((
             Name::new(preset.name()),
             stouter(Vasculature::new(preset).with_seed(args.seed), 2.5),
-            VesselAppearance { shown, ..default() },
+            (VesselAppearance { shown, ..default() }, Organ { kinds: shown }),
         ));
-        let text = (Text::new(caption), TextFont { font_size: FontSize::Px(15.0), ..default() });
+        let font = TextFont { font_size: FontSize::Px(15.0), ..default() };
+        let text = (Text::new(caption), font, TextLayout::justify(Justify::Center));
         let node = Node { position_type: PositionType::Absolute, ..default() };
         commands.spawn((text, node, Caption(place.translation - 0.53 * Vec3::Y)));
     }
@@ -101,21 +109,37 @@ fn spawn_liver(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     Ok(())
 }
 
-/// Captions stay below their discs wherever the camera is.
+/// Wherever the camera looks from, a window of a new shape shows everything.
+fn see_everything(window: Single<&Window>, mut orbit: Single<&mut PanOrbitCamera>, mut seen: Local<Vec2>) {
+    if *seen == window.size() {
+        return;
+    }
+    *seen = window.size();
+    let [low, high] = EVERYTHING;
+    let (half, center) = (0.5 * (high - low), low.midpoint(high));
+    let slope = ops::tan(0.5 * PerspectiveProjection::default().fov);
+    let radius = (half.y / slope).max(half.x / slope * seen.y / seen.x.max(1.0)) + half.z;
+    (orbit.focus, orbit.target_focus) = (center, center);
+    (orbit.radius, orbit.target_radius) = (Some(radius), radius);
+    orbit.yaw.get_or_insert(0.0);
+    orbit.pitch.get_or_insert(0.0);
+    orbit.force_update = true;
+}
+
+/// Captions stay below their discs wherever the camera is, no wider than these.
 fn place_captions(
     camera: Option<Single<(&Camera, &GlobalTransform), With<Camera3d>>>,
     scale: Res<UiScale>,
-    mut captions: Query<(&Caption, &ComputedNode, &mut Node)>,
+    mut captions: Query<(&Caption, &mut Node)>,
 ) {
     let Some(camera) = camera else { return };
-    for (caption, size, mut node) in &mut captions {
-        match camera.0.world_to_viewport(camera.1, caption.0) {
-            Ok(place) => {
-                node.display = Display::Flex;
-                node.left = px(place.x / scale.0 - 0.5 * size.size().x * size.inverse_scale_factor());
-                node.top = px(place.y / scale.0);
-            }
-            Err(_) => node.display = Display::None,
+    for (caption, mut node) in &mut captions {
+        let side = |x| camera.0.world_to_viewport(camera.1, caption.0 + x * Vec3::X).map(|at| at / scale.0);
+        if let (Ok(a), Ok(b)) = (side(-0.55), side(0.55)) {
+            node.display = Display::Flex;
+            (node.left, node.width, node.top) = (px(a.x.min(b.x)), px((b.x - a.x).abs()), px(a.midpoint(b).y));
+        } else {
+            node.display = Display::None;
         }
     }
 }

@@ -132,7 +132,7 @@ fn finish(
 }
 
 fn tell_times(record: Res<Record>, mut status: ResMut<StatusLine>) {
-    status.0.push_str(&format!(" · growth {}", percentiles(&record.growth)));
+    status.0.push_str(&format!(", growth {}", percentiles(&record.growth)));
 }
 
 fn percentiles(times: &[Duration]) -> String {

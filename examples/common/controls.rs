@@ -8,6 +8,7 @@ use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, lig
 use bevy_vessels::{
     plugin::{SurfaceShown, VesselSurface},
     prelude::*,
+    synthesis::tree::ByKind,
 };
 
 /// Help for the keys of [`ControlsPlugin`].
@@ -15,16 +16,30 @@ pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colo
 
 /// An organ of the example, with or without vessels.
 #[derive(Component)]
-pub struct Organ;
+pub struct Organ {
+    /// The kinds of vessels that it ever shows.
+    pub kinds: ByKind<bool>,
+}
 
-/// With a window: space pauses, `.` steps, `A` and `V` toggle arteries and veins, `C` changes the meaning of colours,
-/// `M` switches between closed meshes and segments.
+impl Default for Organ {
+    fn default() -> Self {
+        Self { kinds: ByKind::from_fn(|_| true) }
+    }
+}
+
+/// The kinds of vessels that the keys leave visible, in all organs.
+#[derive(Resource)]
+struct Shown(ByKind<bool>);
+
+/// With a window: space pauses, `.` steps, `A` and `V` toggle arteries and veins of all organs, `C` changes the meaning
+/// of colours, `M` switches between closed meshes and segments.
 pub struct ControlsPlugin;
 
 impl Plugin for ControlsPlugin {
     fn build(&self, app: &mut App) {
         let in_window = resource_exists_and_equals(View::Window);
         app.add_plugins(FrameTimeDiagnosticsPlugin::default())
+            .insert_resource(Shown(ByKind::from_fn(|_| true)))
             .add_systems(Update, (steer, show, switch, tell).chain().run_if(in_window));
     }
 }
@@ -49,7 +64,8 @@ impl OrganAssets<'_> {
         let material = moist_tissue(tint);
         // Without a renderer there are no materials.
         let material = self.materials.as_mut().map(|materials| materials.add(material)).unwrap_or_default();
-        let mut organ = commands.spawn((Organ, Mesh3d(self.meshes.add(mesh)), MeshMaterial3d(material), place));
+        let mut organ =
+            commands.spawn((Organ::default(), Mesh3d(self.meshes.add(mesh)), MeshMaterial3d(material), place));
         if tint.alpha() < 1.0 {
             organ.insert(NotShadowCaster);
         }
@@ -72,13 +88,14 @@ fn steer(
     }
 }
 
-fn show(keys: Res<ButtonInput<KeyCode>>, mut looks: Query<&mut VesselAppearance>) {
+fn show(keys: Res<ButtonInput<KeyCode>>, mut shown: ResMut<Shown>, mut looks: Query<(&Organ, &mut VesselAppearance)>) {
     for (key, kind) in [(KeyCode::KeyA, VesselKind::Artery), (KeyCode::KeyV, VesselKind::Vein)] {
-        for mut look in looks.iter_mut().filter(|_| keys.just_pressed(key)) {
-            look.shown[kind] = !look.shown[kind];
+        if keys.just_pressed(key) {
+            shown.0[kind] = !shown.0[kind];
+            looks.iter_mut().for_each(|(organ, mut look)| look.shown[kind] = shown.0[kind] && organ.kinds[kind]);
         }
     }
-    for mut look in looks.iter_mut().filter(|_| keys.just_pressed(KeyCode::KeyC)) {
+    for (_, mut look) in looks.iter_mut().filter(|_| keys.just_pressed(KeyCode::KeyC)) {
         look.coloring = match look.coloring {
             SegmentColoring::Kind => SegmentColoring::Radius,
             SegmentColoring::Radius => SegmentColoring::Age,

@@ -89,7 +89,7 @@ impl StudioPlugin {
         app.add_plugins(DefaultPlugins.set(window).set(any_file()))
             .add_plugins(PanOrbitCameraPlugin)
             .add_systems(Startup, spawn_texts)
-            .add_systems(Update, show_status.run_if(resource_changed::<StatusLine>));
+            .add_systems(Update, (fit_texts, show_status.run_if(resource_changed::<StatusLine>)));
         View::Window
     }
 
@@ -105,8 +105,9 @@ impl StudioPlugin {
         let log = LogPlugin { filter, ..default() };
         app.add_plugins(headless_plugins(adapter.is_some()).set(log).set(any_file()));
         if adapter.is_some() {
-            app.insert_resource(UiScale(OVERSAMPLING as f32))
-                .add_plugins(OffscreenPlugin { size: self.args.picture_size() * OVERSAMPLING });
+            let size = self.args.picture_size();
+            app.insert_resource(UiScale(text_scale(size.as_vec2()) * OVERSAMPLING as f32))
+                .add_plugins(OffscreenPlugin { size: size * OVERSAMPLING });
         }
         app.add_plugins(PhotoPlugin);
         if adapter.is_some() { View::Pictures } else { View::Nothing }
@@ -167,9 +168,26 @@ pub fn moved(view: &Viewpoint, place: &Transform) -> Viewpoint {
 #[derive(Component)]
 struct StatusText;
 
+/// Width and height of a window, in logical pixels, in which the texts have their full size.
+const ROOMY: Vec2 = Vec2::new(800.0, 500.0);
+
+/// The size of texts in a window or picture, relative to their full size.
+fn text_scale(size: Vec2) -> f32 {
+    (size / ROOMY).min_element().clamp(0.3, 1.0)
+}
+
+/// Texts in small windows are smaller. Long lines break before the window's edge.
+fn fit_texts(window: Single<&Window>, mut scale: ResMut<UiScale>) {
+    let fit = text_scale(window.size());
+    if scale.0 != fit {
+        scale.0 = fit;
+    }
+}
+
 fn spawn_texts(mut commands: Commands, help: Res<Help>) {
     let font = TextFont { font_size: FontSize::Px(14.0), ..default() };
-    let node = |bottom, top| Node { position_type: PositionType::Absolute, left: px(12), bottom, top, ..default() };
+    let place = Node { position_type: PositionType::Absolute, left: px(12), right: px(12), ..default() };
+    let node = |bottom, top| Node { bottom, top, ..place.clone() };
     let color = TextColor(Color::srgba(1.0, 1.0, 1.0, 0.75));
     commands.spawn((Text::new(&help.0), font.clone(), color, node(auto(), px(12))));
     commands.spawn((Text::default(), font, color, node(px(12), auto()), StatusText));

@@ -81,13 +81,17 @@ fn sight(tree: &VesselTree, index: &SegmentIndex, node: usize, center: Vec3) -> 
     Sight { center, radius, from }
 }
 
-/// How much of a joint is seen from a direction, with the eye [`Sight::DISTANCE`] radii away: 1 for all of it.
+/// How much of a joint is seen from a direction, with the eye [`Sight::DISTANCE`] radii away: 1 for all of it, −1 if the
+/// eye is inside a vessel.
 fn open_view(tree: &VesselTree, index: &SegmentIndex, center: Vec3, radius: f32, from: Vec3) -> f32 {
     const RAYS: usize = 5;
     let aside = from.any_orthonormal_vector();
     let up = from.cross(aside);
     let targets = [Vec3::ZERO, aside, -aside, up, -up].map(|to| center + 1.5 * radius * to);
     let far = Sight::DISTANCE * radius;
+    if index.first_hit(tree, center + far * from, -from, 0.0).is_some() {
+        return -1.0;
+    }
     // Up to the vessels of the joint itself.
     let is_free = |target: &Vec3| index.first_hit(tree, *target + far * from, -from, far - 3.0 * radius).is_none();
     targets.iter().filter(|target| is_free(target)).count() as f32 / RAYS as f32

@@ -82,9 +82,13 @@ impl<'a> Builder<'a> {
     pub fn new(looped: &'a Looped<'a>, shape: &'a Shape, tips: TipCap, origin: Vec3) -> Self {
         let tree = &*looped.tree;
         let trunks = Trunks::of(tree);
-        let curves = (0..trunks.len())
-            .map(|trunk| Curve::of(tree, trunks.nodes(trunk), matches!(trunks.base(trunk), Base::Joint { .. }), origin))
-            .collect();
+        let curve = |trunk: usize| {
+            let nodes = trunks.nodes(trunk);
+            let is_lateral = matches!(trunks.base(trunk), Base::Joint { .. });
+            let goes_on = [0, nodes.len() - 1].map(|end| looped.at(nodes[end]).is_some());
+            Curve::of(tree, nodes, is_lateral, goes_on, origin)
+        };
+        let curves = (0..trunks.len()).map(curve).collect();
         let holes = vec![None; trunks.len()];
         let cage = Cage { starts: vec![0], ..Cage::default() };
         Self {
@@ -145,7 +149,7 @@ impl<'a> Builder<'a> {
             self.report.shortened += if row.is_shortened() { count } else { 0 };
             self.report.moved += if row.is_moved() { count } else { 0 };
         }
-        let spoke = self.trunks.nodes(trunk).last().and_then(|&tip| self.spoke_at(tip));
+        let spoke = self.spoke_at(trunk, &start);
         self.rings.lay(curve, &start, &mut rows, self.shape, spoke);
         for row in &rows {
             if let Some(reach) = self.doubtful(row, self.curves[trunk].radius_at(row.length)) {
@@ -262,12 +266,14 @@ impl<'a> Builder<'a> {
         match edge {
             Some(edge) => self.cage.sleeve(&edge, &first, self.bases[0]),
             None => {
-                let base = OpenEnd { ring: first, base: self.bases[0], end: End::Base, node: base_node };
+                let before = self.rings.rings[last.min(1)].station.center;
+                let base = OpenEnd { ring: first, before, base: self.bases[0], end: End::Base, node: base_node };
                 self.end_tube(base, TipCap::Round);
             }
         }
         let (ring, tip) = (self.rings.rings[last], self.cage.corners.len());
-        self.end_tube(OpenEnd { ring, base: self.bases[last], end: End::Tip, node }, self.tips);
+        let before = self.rings.rings[last.saturating_sub(1)].station.center;
+        self.end_tube(OpenEnd { ring, before, base: self.bases[last], end: End::Tip, node }, self.tips);
         self.layout.end([tip, self.cage.corners.len()]);
     }
 
@@ -286,10 +292,17 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The direction of a vertex that a tube's last ring should face, if it ends in another tube.
-    fn spoke_at(&self, tip: u32) -> Option<Vec3> {
-        match &self.seams[self.looped.at(tip)?] {
+    /// The direction of a vertex that a trunk's last ring should face, if it ends in another tube or in its own beginning.
+    fn spoke_at(&self, trunk: usize, start: &Start) -> Option<Vec3> {
+        let nodes = self.trunks.nodes(trunk);
+        let number = self.looped.at(*nodes.last()?)?;
+        match &self.seams[number] {
             Seam::Open(other) => Some(other.spoke(&self.cage)),
+            Seam::Ahead if self.looped.at(nodes[0]) == Some(number) => {
+                let station = self.curves[trunk].at(start.length);
+                let (sine, cosine) = ops::sin_cos(start.columns.at(0.0));
+                Some(station.right * cosine + station.up() * sine)
+            }
             Seam::Ahead | Seam::Done => None,
         }
     }

@@ -96,13 +96,15 @@ pub(super) struct Curve {
 impl Curve {
     /// The curve of a trunk. `origin` is subtracted from positions.
     ///
-    /// `is_lateral`: the first node is another trunk's, and has that one's radius.
-    pub fn of(tree: &VesselTree, nodes: &[u32], is_lateral: bool, origin: Vec3) -> Self {
+    /// `is_lateral`: the first node is another trunk's, and has that one's radius. `goes_on`: its base,
+    /// and its tip, lie within a segment whose other half ends there, too.
+    pub fn of(tree: &VesselTree, nodes: &[u32], is_lateral: bool, goes_on: [bool; 2], origin: Vec3) -> Self {
         let mut curve = Self::default();
         curve.set_marks(tree, nodes, is_lateral);
         curve.keep_nodes(tree, nodes, origin);
         curve.ease_long_segments();
         curve.set_directions();
+        curve.set_ends(tree, nodes, goes_on);
         curve.set_lengths();
         curve.set_mark_lengths();
         curve
@@ -201,6 +203,18 @@ impl Curve {
         }
         let first = self.knots[0].ahead.any_orthonormal_vector();
         self.set_frames(first);
+    }
+
+    /// Sets the directions of ends that go on: those of their segments.
+    fn set_ends(&mut self, tree: &VesselTree, nodes: &[u32], goes_on: [bool; 2]) {
+        let ([first, second, ..], [.., before, last]) = (nodes, nodes) else { return };
+        let tip = self.knots.len() - 1;
+        for (is_set, knot, [from, to]) in [(goes_on[0], 0, [first, second]), (goes_on[1], tip, [before, last])] {
+            if is_set && let Some(ahead) = unit(tree.positions()[*to as usize] - tree.positions()[*from as usize]) {
+                self.knots[knot].ahead = ahead;
+                self.set_frames(self.knots[0].right);
+            }
+        }
     }
 
     /// Sets the frames from that of the base.

@@ -75,6 +75,14 @@ pub(super) struct Start {
     pub sides: u32,
 }
 
+impl Station {
+    /// How far the surface at a ring here lies to the inner side of a bend between the middles of its neighbours.
+    pub fn cut_between(&self, before: Vec3, after: Vec3) -> Vec3 {
+        let cut = (self.center - before + self.center - after) / 6.0;
+        (cut - self.ahead * self.ahead.dot(cut)).clamp_length_max(MOST_SWELL * self.radius)
+    }
+}
+
 /// All rings of a trunk.
 #[derive(Debug, Default)]
 pub(super) struct Rings {
@@ -246,9 +254,7 @@ impl Rings {
             let [a, b, c] = [index - 1, index, index + 1].map(|ring| self.rings[ring]);
             let (from, here, to) = (before, b.station.center, c.station.center);
             before = here;
-            let (most, ahead) = (MOST_SWELL * b.station.radius, b.station.ahead);
-            let cut = (here - from + here - to) / 6.0;
-            let aside = (cut - ahead * ahead.dot(cut)).clamp_length_max(most);
+            let (most, aside) = (MOST_SWELL * b.station.radius, b.station.cut_between(from, to));
             let span = c.length - a.length;
             let moved = (a.length - 2.0 * b.length + c.length) / 6.0;
             let slope = if span > 0.0 { (c.station.radius - a.station.radius) / span } else { 0.0 };

@@ -12,6 +12,8 @@ use bevy_math::{Vec2, Vec3};
 #[derive(Clone, Debug)]
 pub(super) struct OpenEnd {
     pub ring: Ring,
+    /// Middle of the ring before it.
+    pub before: Vec3,
     /// First vertex of the ring.
     pub base: u32,
     pub end: End,
@@ -49,6 +51,13 @@ impl OpenEnd {
         }
     }
 
+    /// Moves the ring so that the surface follows the bend, now that its neighbours are known.
+    fn swell(&self, cage: &mut Cage, after: Vec3) {
+        let aside = self.ring.station.cut_between(self.before, after);
+        let vertices = self.base as usize..(self.base + self.ring.sides) as usize;
+        cage.vertices.positions[vertices].iter_mut().for_each(|position| *position += aside);
+    }
+
     fn vertex(&self, step: u32) -> u32 {
         self.base + self.line(step % self.ring.sides) % self.ring.sides
     }
@@ -67,6 +76,8 @@ pub(super) fn join(cage: &mut Cage, first: &OpenEnd, second: &OpenEnd) -> bool {
     if ratio > 2 {
         return false;
     }
+    few.swell(cage, many.ring.station.center);
+    many.swell(cage, few.ring.station.center);
     let position = |vertex: u32| cage.vertices.positions[vertex as usize];
     // Seen from one end, the other one's steps run backwards.
     let facing =
