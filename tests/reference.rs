@@ -68,7 +68,7 @@ fn ball() -> Arc<dyn Tissue> {
     Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball of radius 0.5"))
 }
 
-/// The settings of a preset that grows by space colonization, as all do.
+/// The settings of a preset that grows by space colonization.
 fn settings_of(preset: &Preset) -> &ColonizationSettings {
     preset.generator.colonization().expect("presets colonize")
 }

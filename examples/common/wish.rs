@@ -2,7 +2,10 @@
 
 use crate::common::studio::StudioArgs;
 use bevy::prelude::*;
-use bevy_vessels::{prelude::*, synthesis::organ::RootSites};
+use bevy_vessels::{
+    prelude::*,
+    synthesis::{organ::RootSites, units::Flow},
+};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -44,13 +47,23 @@ impl OrganArgs {
     /// The vessels, with their radii multiplied so that they are visible from afar, or fine from near.
     pub fn vessels(&self, roots: Option<&RootSites>, radii: f32) -> Vasculature {
         let mut wish = Vasculature::new(self.preset).with_seed(self.seed);
-        let settings = wish.generator.colonization_mut().expect("presets colonize");
-        settings.arterial.terminal_radius *= radii;
-        settings.venous.terminal_radius *= radii;
+        let mut steps = 0;
+        if let Some(settings) = wish.generator.colonization_mut() {
+            settings.arterial.terminal_radius *= radii;
+            settings.venous.terminal_radius *= radii;
+            steps = settings.steps;
+        }
+        if let Some(settings) = wish.generator.cco_mut() {
+            // The fourth power of a radius is in proportion to the flow.
+            let widened = |rate: Flow| rate.cubic_metres_per_second() * f64::from(radii).powi(4);
+            for flow in settings.flow.values_mut() {
+                flow.rate = Flow::from_cubic_metres_per_second(widened(flow.rate));
+            }
+        }
         let mode = match self.mode {
             Mode::Surface => TissueMode::Surface,
             Mode::Volume => TissueMode::Volume,
-            Mode::Staged => TissueMode::Staged { surface_steps: settings.steps / 2 },
+            Mode::Staged => TissueMode::Staged { surface_steps: steps / 2 },
         };
         wish.tissue = mode.into();
         if let Some(roots) = roots {

@@ -1,10 +1,11 @@
-//! The command's options, and the growth of organs from them.
+//! The growth of organs from the command's options.
 
 mod batch;
 mod edit;
 mod flow;
 mod identity;
 mod mesh;
+mod options;
 mod organ;
 mod report;
 mod summary;
@@ -13,16 +14,17 @@ use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::ColonizationSettings,
     generator::Generator,
-    io::{MeshReadError, ObjOptions, load_mesh, remove_stale},
+    io::{MeshReadError, load_mesh, remove_stale},
     mesh::TriangleMesh,
-    preset::{Preset, PresetName},
+    preset::Preset,
     roots::RootPlacement,
     surface::SurfaceSettings,
     tissue::{MeshTissue, SourceData, Tissue, TissueMode, TissueShape, TissueSource},
     units::Scale,
 };
-use clap::{Parser, ValueEnum, builder::TypedValueParser};
 use identity::Run;
+pub use options::Options;
+use options::{Format, Method, Mode, Shard, Unit};
 use std::fs::{self, Metadata};
 use std::io::Write;
 use std::num::NonZeroUsize;
@@ -31,209 +33,6 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 pub use summary::Summary;
-
-/// Grows arteries and veins in organs, without a window.
-#[derive(Debug, Parser)]
-#[command(name = "generate", version, args_override_self = true)]
-pub struct Options {
-    /// What to grow in: disc, ball or box, of diameter or edge 1 around the origin, or the mesh of an organ (GLB, glTF,
-    /// OBJ).
-    #[arg(long, default_value = "disc", value_name = "disc|ball|box|FILE")]
-    pub tissue: PathBuf,
-    /// Unit of the tissue's lengths, noted in all files. SWC files are then in micrometres, as other programs expect;
-    /// all others stay in the tissue's lengths.
-    #[arg(long)]
-    pub unit: Option<Unit>,
-    /// Where on an organ's mesh vessels grow: over its surface, through its volume, or both in stages. Default: the
-    /// preset's.
-    #[arg(long)]
-    pub mode: Option<Mode>,
-    /// Built-in settings, by name.
-    #[arg(long, default_value_t, conflicts_with = "settings", value_name = "NAME")]
-    pub preset: PresetName,
-    /// Your own preset, as a RON file.
-    #[arg(long, value_name = "FILE.ron")]
-    pub settings: Option<PathBuf>,
-    /// Changes one value of the preset, such as `arterial.direction_weight=0.9`. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-    /// Number of growth steps. Default: the preset's.
-    #[arg(long)]
-    pub steps: Option<u32>,
-    /// Samples drawn from the tissue in each step. Default: the preset's.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
-    pub samples: Option<u32>,
-    /// Multiplies every length of the settings, after fitting them to the tissue.
-    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
-    pub lengths: f32,
-    /// Grows arteries only.
-    #[arg(long)]
-    pub no_veins: bool,
-    /// Number of threads, or fewer if the system allows no more. They share the organs; spare threads share the work on
-    /// one organ. Default: all cores.
-    #[arg(long)]
-    pub threads: Option<NonZeroUsize>,
-    /// Seed of the first organ.
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// Number of organs, with seeds counting up.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
-    pub count: u64,
-    /// Share of the organs to grow, I of N, counted from 0: those whose number modulo N is I.
-    #[arg(long, value_name = "I/N", default_value = "0/1", value_parser = parse_shard)]
-    pub shard: Shard,
-    /// Folder for the vessels, created if missing. Without it, nothing is written. Other runs may have the same: names
-    /// begin with tissue, mode, preset and a hash of all that distinguishes a run, which stands in full in a .ron file.
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Skips organs whose files are there, and reports them as they were.
-    #[arg(long, requires = "out")]
-    pub resume: bool,
-    /// Formats to write.
-    #[arg(long, value_delimiter = ',', default_value = "swc")]
-    pub format: Vec<Format>,
-    /// Sides of the round cones in OBJ files, 3 to 64. Files are the larger the more there are.
-    #[arg(long, default_value_t = ObjOptions::DEFAULT_SIDES, value_name = "N", value_parser = obj_sides())]
-    pub obj_sides: u32,
-    /// Solves the blood flow: CSV files get columns with flow, pressure, velocity and wall shear stress, JSON the flow
-    /// into the organ.
-    #[arg(long, requires = "unit")]
-    pub flow: bool,
-    /// Makes the closed meshes for their figures, even if none is written. Files of meshes make them anyway.
-    #[arg(long)]
-    pub mesh: bool,
-    /// Subdivisions of the closed meshes, 0 to 4. Each makes four times as many faces.
-    #[arg(long, default_value_t = SurfaceSettings::DEFAULT_LEVEL, value_name = "N")]
-    pub mesh_level: u32,
-    /// Sides of the closed meshes around the widest vessels, before subdivision: 4, 8, 16, 32 or 64.
-    #[arg(long, default_value_t = SurfaceSettings::DEFAULT_MOST_SIDES, value_name = "N")]
-    pub mesh_sides: u32,
-    /// Prints one line of JSON per organ, with the figures of its closed meshes if these are made.
-    #[arg(long)]
-    pub json: bool,
-}
-
-fn obj_sides() -> impl TypedValueParser<Value = u32> {
-    clap::value_parser!(u32).range(i64::from(ObjOptions::MIN_SIDES)..=i64::from(ObjOptions::MAX_SIDES))
-}
-
-/// A unit of lengths.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Unit {
-    /// Metres, as in glTF files.
-    M,
-    /// Centimetres.
-    Cm,
-    /// Millimetres.
-    Mm,
-    /// Micrometres.
-    #[value(alias = "µm", alias = "μm")]
-    Um,
-}
-
-impl Unit {
-    /// The name on the command line and in files.
-    fn name(self) -> &'static str {
-        match self {
-            Self::M => "m",
-            Self::Cm => "cm",
-            Self::Mm => "mm",
-            Self::Um => "um",
-        }
-    }
-
-    fn scale(self) -> Scale {
-        match self {
-            Self::M => Scale::METRES,
-            Self::Cm => Scale::CENTIMETRES,
-            Self::Mm => Scale::MILLIMETRES,
-            Self::Um => Scale::MICROMETRES,
-        }
-    }
-}
-
-/// A share of the organs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    index: u64,
-    of: u64,
-}
-
-fn parse_shard(text: &str) -> Result<Shard, String> {
-    let parts = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
-    match parts {
-        Some((index, of)) if index < of => Ok(Shard { index, of }),
-        _ => Err("a shard is I/N with I from 0 to N − 1, such as 0/4".into()),
-    }
-}
-
-/// Where on the mesh of an organ vessels grow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Mode {
-    /// Over the surface.
-    Surface,
-    /// Through the volume.
-    Volume,
-    /// Over the surface first, then inward through the volume.
-    Staged,
-}
-
-impl Mode {
-    /// The name on the command line and in files.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Surface => "surface",
-            Self::Volume => "volume",
-            Self::Staged => "staged",
-        }
-    }
-
-    /// The tissue's mode. Stages of the preset stay; otherwise half of all steps go to the surface.
-    fn tissue_mode(self, preset: TissueMode, steps: u32) -> TissueMode {
-        match (self, preset) {
-            (Self::Surface, _) => TissueMode::Surface,
-            (Self::Volume, _) => TissueMode::Volume,
-            (Self::Staged, TissueMode::Staged { .. }) => preset,
-            (Self::Staged, _) => TissueMode::Staged { surface_steps: steps / 2 },
-        }
-    }
-}
-
-/// A format of files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
-pub enum Format {
-    /// Nodes and radii, a file for each kind of vessels.
-    Swc,
-    /// A surface to look at: round cones that overlap.
-    Obj,
-    /// A table of segments.
-    Csv,
-    /// Closed meshes, as binary glTF.
-    Glb,
-    /// Closed meshes, as binary STL.
-    Stl,
-    /// Closed meshes of triangles, as binary PLY, with the measures of the vessels.
-    Ply,
-    /// Closed meshes, as OFF.
-    Off,
-    /// Closed meshes, as OBJ.
-    ObjMesh,
-}
-
-impl Format {
-    /// The extension of its files.
-    fn extension(self) -> &'static str {
-        match self {
-            Self::Swc => "swc",
-            Self::Obj | Self::ObjMesh => "obj",
-            Self::Csv => "csv",
-            Self::Glb => "glb",
-            Self::Stl => "stl",
-            Self::Ply => "ply",
-            Self::Off => "off",
-        }
-    }
-}
 
 /// Why the command stopped.
 #[derive(Debug, thiserror::Error)]
@@ -339,6 +138,12 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
     if let Some(samples) = options.samples {
         colonization(&mut preset, "--samples")?.samples = samples;
     }
+    if let Some(terminals) = options.terminals {
+        let settings = preset.generator.cco_mut();
+        settings
+            .ok_or_else(|| Failure::usage("--terminals is for --method cco; the preset grows otherwise"))?
+            .terminals = terminals;
+    }
     if options.no_veins {
         preset.roots.vein = RootPlacement::None;
     }
@@ -412,8 +217,23 @@ fn colonization<'a>(preset: &'a mut Preset, option: &str) -> Result<&'a mut Colo
 }
 
 fn read_preset(options: &Options) -> Result<(Preset, String), Failure> {
+    let (preset, name) = find_preset(options)?;
+    match options.method {
+        Some(method) if !method.is_of(&preset.generator) => {
+            let method = method.name();
+            Err(Failure::Usage(format!(
+                "--method {method} conflicts with {name}, which grows otherwise; leave out one of them"
+            )))
+        }
+        _ => Ok((preset, name)),
+    }
+}
+
+fn find_preset(options: &Options) -> Result<(Preset, String), Failure> {
     let Some(path) = &options.settings else {
-        return Ok((options.preset.load(), options.preset.name().to_owned()));
+        let by_method = || options.method.unwrap_or(Method::Colonization).preset(&options.tissue);
+        let preset = options.preset.unwrap_or_else(by_method);
+        return Ok((preset.load(), preset.name().to_owned()));
     };
     let named = |cause: &dyn std::fmt::Display| Failure::Run(format!("{}: {cause}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| named(&error))?;
@@ -446,8 +266,11 @@ fn build_tissue(
                 _ => MeshTissue::default(),
             };
             if let Some(mode) = mode {
-                let steps = colonization(preset, "--mode")?.steps;
+                let steps = preset.generator.colonization().map_or(0, |settings| settings.steps);
                 tissue.mode = mode.tissue_mode(tissue.mode, steps);
+            } else if preset.generator.cco().is_some() {
+                // The only mode in which it can grow.
+                tissue.mode = TissueMode::Volume;
             }
             preset.tissue = tissue.into();
             let mesh = load_mesh(&options.tissue).map_err(|error| match error {

@@ -138,6 +138,8 @@ fn changes(options: &Options) -> Option<String> {
     let given = |name: &str, value: Option<String>| value.map(|value| format!("--{name} {value}"));
     let changes: Vec<String> = [
         given("mode", options.mode.map(|mode| mode.name().to_owned())),
+        given("method", options.method.map(|method| method.name().to_owned())),
+        given("terminals", options.terminals.map(|terminals| terminals.to_string())),
         given("steps", options.steps.map(|steps| steps.to_string())),
         given("samples", options.samples.map(|samples| samples.to_string())),
         given("lengths", (options.lengths != 1.0).then(|| options.lengths.to_string())),

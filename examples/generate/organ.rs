@@ -2,9 +2,10 @@
 
 use super::flow::flows;
 use super::mesh::{Meshed, meshes, save};
-use super::report::{KindMeasures, Line};
+use super::report::{CcoFigures, KindMeasures, Line};
 use super::{Failure, Format, Job, Unit};
 use bevy_vessels::synthesis::{
+    cco::Cco,
     growth::{Growth, StepCount},
     haemodynamics::Network,
     io::{
@@ -13,6 +14,7 @@ use bevy_vessels::synthesis::{
     roots::Roots,
     tree::{ByKind, VesselKind, VesselTree, hash_trees},
 };
+use std::any::Any;
 use std::fmt::Display;
 use std::fs;
 use std::path::PathBuf;
@@ -89,6 +91,7 @@ impl<'a> Grower<'a> {
             grow_ms: (grow_ms * 1e3).round() / 1e3,
             hash: format!("{hash:016x}"),
             kinds: KindMeasures::of(growth, &*self.job.tissue, seed, &measured, &flows),
+            cco: CcoFigures::of(growth),
             files: Vec::new(),
         };
         Written { job: self.job, trees: &trees, meshes: &meshes, flows: &flows, seed, hash }.write(&mut line)?;
@@ -113,6 +116,9 @@ impl<'a> Grower<'a> {
             after_step(growth.progress());
         }
         growth.settle();
+        if let Some(cco) = (growth as &dyn Any).downcast_ref::<Cco>() {
+            cco.outcome().map_err(|error| named(&error))?;
+        }
         Ok(1e3 * start.elapsed().as_secs_f64())
     }
 }

@@ -3,6 +3,7 @@
 use super::mesh::{MeshFigures, Meshed};
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
+    cco::Cco,
     growth::{GrownTree, Growth},
     haemodynamics::Network,
     random::Stream,
@@ -13,6 +14,7 @@ use bevy_vessels::synthesis::{
     },
 };
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::any::Any;
 use std::collections::BTreeMap;
 
 /// Points drawn from the tissue to measure coverage: its standard error is below 0.4 %.
@@ -44,6 +46,9 @@ pub struct Line {
     /// Each kind of vessels, under its name: `arterial`, `venous`, `portal`, `ductal`.
     #[serde(flatten)]
     pub kinds: KindMeasures,
+    /// Constrained constructive optimisation, if that is the method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cco: Option<CcoFigures>,
     /// Written files.
     pub files: Vec<String>,
 }
@@ -72,6 +77,37 @@ impl From<Extent> for Size {
             Extent::Volume(value) => (SizeKind::Volume, value),
         };
         Self { kind, value }
+    }
+}
+
+/// Figures of constrained constructive optimisation, over all kinds of vessels.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct CcoFigures {
+    /// Terminals that were placed.
+    terminals: u32,
+    /// Volume of all vessels, in mm³.
+    volume: f64,
+    /// Radius of the widest root, in mm.
+    root_radius: f64,
+    /// Pairs of vessels that overlap though they share no node.
+    overlaps: usize,
+    /// Places of terminals that could not be connected.
+    rejected: u64,
+}
+
+impl CcoFigures {
+    /// Measures a growth; `None` for other methods.
+    pub fn of(growth: &dyn Growth) -> Option<Self> {
+        let growth = (growth as &dyn Any).downcast_ref::<Cco>()?;
+        let mm = growth.millimetres();
+        let none = Self { terminals: 0, volume: 0.0, root_radius: 0.0, overlaps: growth.overlaps(), rejected: 0 };
+        Some(growth.reports().fold(none, |sum, kind| Self {
+            terminals: sum.terminals + kind.terminals,
+            volume: sum.volume + kind.volume * mm * mm * mm,
+            root_radius: sum.root_radius.max(kind.root_radius * mm),
+            rejected: sum.rejected + kind.rejected,
+            ..sum
+        }))
     }
 }
 

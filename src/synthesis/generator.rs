@@ -3,6 +3,7 @@
 //! In: a tissue, roots and a seed. Out: a [`Growth`]. A new generator is a new variant here.
 
 use crate::synthesis::{
+    cco::{Cco, CcoError, CcoSettings},
     colonization::{Colonization, ColonizationError, ColonizationSettings},
     growth::{Growth, GrowthWarning},
     roots::{RootSpacing, Roots},
@@ -18,6 +19,9 @@ use std::{any::Any, fmt, sync::Arc};
 pub enum Generator {
     /// Space colonization: arteries and veins that grow towards drains (Rauch & Harders 2021).
     Colonization(ColonizationSettings),
+    /// Constrained constructive optimisation: trees of least volume of any kinds, in an area or a volume with a border
+    /// (OpenCCO 2023).
+    Cco(CcoSettings),
     /// A custom generator. It can't be written to a file: saving a preset or a scene that holds it is an error.
     #[cfg_attr(feature = "serialize", serde(skip))]
     Custom(CustomGenerator),
@@ -29,6 +33,9 @@ pub enum GeneratorError {
     /// Space colonization cannot start.
     #[error(transparent)]
     Colonization(#[from] ColonizationError),
+    /// Constrained constructive optimisation cannot start.
+    #[error(transparent)]
+    Cco(#[from] CcoError),
     /// A custom generator cannot start.
     #[error("{reason}")]
     Custom {
@@ -48,6 +55,7 @@ impl Generator {
                 let warnings = settings.validate().map_err(ColonizationError::from)?;
                 Ok(warnings.iter().map(GrowthWarning::new).collect())
             }
+            Self::Cco(settings) => Ok(settings.validate().map_err(CcoError::from)?),
             Self::Custom(_) => Ok(Vec::new()),
         }
     }
@@ -58,6 +66,7 @@ impl Generator {
     pub fn fit(self, extent: Extent) -> Self {
         match self {
             Self::Colonization(settings) => Self::Colonization(settings.fit(extent)),
+            Self::Cco(settings) => Self::Cco(settings.fit(extent)),
             Self::Custom(custom) => Self::Custom(custom.scaled(extent.equivalent_diameter())),
         }
     }
@@ -67,14 +76,16 @@ impl Generator {
     pub fn scaled(self, factor: f32) -> Self {
         match self {
             Self::Colonization(settings) => Self::Colonization(settings.scaled(factor)),
+            Self::Cco(settings) => Self::Cco(settings.scaled(factor)),
             Self::Custom(custom) => Self::Custom(custom.scaled(factor)),
         }
     }
 
-    /// The spacing of roots for each kind of vessels that this generator grows.
-    pub fn root_spacing(&self) -> ByKind<Option<RootSpacing>> {
+    /// The spacing of roots in a tissue of this extent, for each kind of vessels that this generator grows.
+    pub fn root_spacing(&self, extent: Extent) -> ByKind<Option<RootSpacing>> {
         match self {
             Self::Colonization(settings) => settings.root_spacing(),
+            Self::Cco(settings) => settings.root_spacing(extent),
             Self::Custom(custom) => custom.maker.root_spacing(custom.scale),
         }
     }
@@ -86,6 +97,7 @@ impl Generator {
     pub fn start(&self, tissue: Arc<dyn Tissue>, roots: &Roots, seed: u64) -> Result<Box<dyn Growth>, GeneratorError> {
         match self {
             Self::Colonization(settings) => Ok(Box::new(Colonization::new(tissue, settings.clone(), roots, seed)?)),
+            Self::Cco(settings) => Ok(Box::new(Cco::new(tissue, settings.clone(), roots, seed)?)),
             Self::Custom(custom) => {
                 let started = custom.maker.start(tissue, roots, custom.scale, seed);
                 started.map_err(|reason| GeneratorError::Custom { reason })
@@ -104,21 +116,29 @@ impl Generator {
         roots: &Roots,
         seed: u64,
     ) -> Result<Box<dyn Growth>, GeneratorError> {
-        let growth: Box<dyn Any> = growth;
-        match (self, growth.downcast::<Colonization>()) {
-            (Self::Colonization(settings), Ok(mut growth)) if Arc::ptr_eq(growth.tissue(), &tissue) => {
-                growth.restart(settings.clone(), roots, seed)?;
-                Ok(growth)
+        match self {
+            Self::Colonization(settings) => {
+                if let Some(mut growth) = as_own::<Colonization>(growth, |own| Arc::ptr_eq(own.tissue(), &tissue)) {
+                    growth.restart(settings.clone(), roots, seed)?;
+                    return Ok(growth);
+                }
             }
-            _ => self.start(tissue, roots, seed),
+            Self::Cco(settings) => {
+                if let Some(mut growth) = as_own::<Cco>(growth, |own| Arc::ptr_eq(own.tissue(), &tissue)) {
+                    growth.restart(settings.clone(), roots, seed)?;
+                    return Ok(growth);
+                }
+            }
+            Self::Custom(_) => {}
         }
+        self.start(tissue, roots, seed)
     }
 
     /// The settings of space colonization, if this is it.
     pub fn colonization(&self) -> Option<&ColonizationSettings> {
         match self {
             Self::Colonization(settings) => Some(settings),
-            Self::Custom(_) => None,
+            Self::Cco(_) | Self::Custom(_) => None,
         }
     }
 
@@ -126,14 +146,42 @@ impl Generator {
     pub fn colonization_mut(&mut self) -> Option<&mut ColonizationSettings> {
         match self {
             Self::Colonization(settings) => Some(settings),
-            Self::Custom(_) => None,
+            Self::Cco(_) | Self::Custom(_) => None,
         }
     }
+
+    /// The settings of constrained constructive optimisation, if this is it.
+    pub fn cco(&self) -> Option<&CcoSettings> {
+        match self {
+            Self::Cco(settings) => Some(settings),
+            Self::Colonization(_) | Self::Custom(_) => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn cco_mut(&mut self) -> Option<&mut CcoSettings> {
+        match self {
+            Self::Cco(settings) => Some(settings),
+            Self::Colonization(_) | Self::Custom(_) => None,
+        }
+    }
+}
+
+/// A growth as its own type, if it is of that type and usable.
+fn as_own<G: Growth>(growth: Box<dyn Growth>, is_usable: impl Fn(&G) -> bool) -> Option<Box<G>> {
+    let growth: Box<dyn Any> = growth;
+    growth.downcast::<G>().ok().filter(|growth| is_usable(growth))
 }
 
 impl Default for Generator {
     fn default() -> Self {
         Self::Colonization(ColonizationSettings::default())
+    }
+}
+
+impl From<CcoSettings> for Generator {
+    fn from(settings: CcoSettings) -> Self {
+        Self::Cco(settings)
     }
 }
 

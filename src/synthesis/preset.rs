@@ -234,6 +234,12 @@ presets! {
     Conjunctiva = "conjunctiva",
     /// The back of the eye.
     Retina = "retina",
+    /// OpenCCO's disc: arteries of least volume.
+    CcoDisc = "cco-disc",
+    /// OpenCCO's ball.
+    CcoBall = "cco-ball",
+    /// The liver with four trees of least volume that avoid each other.
+    CcoLiver = "cco-liver",
 }
 
 #[cfg(feature = "serialize")]

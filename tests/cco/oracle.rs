@@ -2,7 +2,7 @@
 
 use bevy_math::DVec3;
 use bevy_vessels::synthesis::{
-    cco::Cco,
+    cco::{Cco, VesselFlow},
     growth::Growth,
     tree::{VesselKind, VesselTree},
 };
@@ -77,7 +77,7 @@ pub fn check(name: &str, growth: &Cco) {
         let gamma = growth.settings().bifurcation_exponent;
         let residual = tree.murray_residual(gamma);
         assert!(residual <= 1e-6, "{name}: Murray's residual is {residual}");
-        check_flow(name, growth, tree);
+        check_flow(name, growth, report.kind);
         let volume: f64 = tree
             .segments()
             .map(|(node, parent)| {
@@ -94,7 +94,8 @@ pub fn check(name: &str, growth: &Cco) {
 
 /// Blood that enters at the root's pressure, and leaves equally from all terminals, arrives at each with the terminals'
 /// pressure: Poiseuille's law along every way, with radii and lengths in millimetres.
-fn check_flow(name: &str, growth: &Cco, tree: &VesselTree) {
+fn check_flow(name: &str, growth: &Cco, kind: VesselKind) {
+    let tree = growth.tree(kind);
     let settings = growth.settings();
     let extent = growth.tissue().extent();
     let share = f64::from(settings.perfusion);
@@ -114,16 +115,17 @@ fn check_flow(name: &str, growth: &Cco, tree: &VesselTree) {
     }
     let all: u32 = tree.roots().map(|root| terminals[root]).sum();
     assert_eq!(all, settings.terminals, "{name}");
-    let flow = settings.flow.cubic_metres_per_second() * 1e9 / f64::from(settings.terminals);
-    let mut pressures = vec![settings.root_pressure.pascals(); tree.len()];
+    let VesselFlow { rate, viscosity, root_pressure, terminal_pressure } = settings.flow[kind];
+    let flow = rate.cubic_metres_per_second() * 1e9 / f64::from(settings.terminals);
+    let mut pressures = vec![root_pressure.pascals(); tree.len()];
     for (node, parent) in tree.segments() {
         let length = f64::from(tree.positions()[node].distance(tree.positions()[parent])) * scale;
         let radius = f64::from(tree.radii()[node]) * scale;
-        let resistance = 8.0 * settings.viscosity.pascal_seconds() * length / (std::f64::consts::PI * radius.powi(4));
+        let resistance = 8.0 * viscosity.pascal_seconds() * length / (std::f64::consts::PI * radius.powi(4));
         pressures[node] = pressures[parent] - resistance * flow * f64::from(terminals[node]);
     }
-    let expected = settings.terminal_pressure.pascals();
-    let drop = settings.root_pressure.pascals() - expected;
+    let expected = terminal_pressure.pascals();
+    let drop = root_pressure.pascals() - expected;
     for tip in tree.tips().into_iter().map(|tip| tip as usize) {
         let error = (pressures[tip] - expected).abs() / drop;
         assert!(error <= 1e-3, "{name}: terminal {tip} has {} Pa instead of {expected}", pressures[tip]);

@@ -31,7 +31,8 @@ fn means(is_flat: bool, terminals: u32, polish_sweeps: u32) -> (f64, f64) {
             (size, Arc::new(Ball::new(Vec3::ZERO, size).expect("a ball")))
         };
         let terminal_pressure = Pressure::from_pascals(if terminals > 250 { 7980.0 } else { 8400.0 });
-        let settings = CcoSettings { terminals, perfusion, terminal_pressure, polish_sweeps, ..CcoSettings::default() };
+        let mut settings = CcoSettings { terminals, perfusion, polish_sweeps, ..CcoSettings::default() };
+        settings.flow.artery.terminal_pressure = terminal_pressure;
         let mut growth = arteries(tissue, settings, Vec3::Y * size, seed);
         growth.run().expect("room for all");
         let report = growth.reports().next().expect("arteries");

@@ -3,7 +3,7 @@
 use crate::{arteries, common, oracle::check_overlaps};
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
-    cco::{Cco, CcoError, CcoSettings},
+    cco::{Cco, CcoError, CcoSettings, VesselFlow},
     growth::Growth,
     roots::{RootPlacement, RootPlacements},
     tissue::{Ball, Disc, Tissue},
@@ -19,6 +19,11 @@ fn disc() -> Arc<dyn Tissue> {
 #[test]
 fn settings_outside_their_limits_are_named() {
     let base = CcoSettings::default();
+    let with_flow = |change: fn(&mut VesselFlow)| {
+        let mut settings = base.clone();
+        change(&mut settings.flow.artery);
+        settings
+    };
     let cases = [
         ("terminals", CcoSettings { terminals: 0, ..base.clone() }),
         ("terminals", CcoSettings { terminals: u32::MAX, ..base.clone() }),
@@ -26,10 +31,12 @@ fn settings_outside_their_limits_are_named() {
         ("perfusion", CcoSettings { perfusion: f32::NAN, ..base.clone() }),
         ("bifurcation_exponent", CcoSettings { bifurcation_exponent: 0.0, ..base.clone() }),
         ("bifurcation_exponent", CcoSettings { bifurcation_exponent: f32::INFINITY, ..base.clone() }),
-        ("viscosity", CcoSettings { viscosity: Viscosity::ZERO, ..base.clone() }),
-        ("flow", CcoSettings { flow: Flow::ZERO, ..base.clone() }),
-        ("terminal_pressure", CcoSettings { terminal_pressure: Pressure::from_mmhg(120.0), ..base.clone() }),
-        ("root_pressure", CcoSettings { root_pressure: Pressure::from_mmhg(f64::NAN), ..base.clone() }),
+        ("viscosity", with_flow(|flow| flow.viscosity = Viscosity::ZERO)),
+        ("rate", with_flow(|flow| flow.rate = Flow::ZERO)),
+        ("terminal_pressure", with_flow(|flow| flow.terminal_pressure = Pressure::from_mmhg(120.0))),
+        ("root_pressure", with_flow(|flow| flow.root_pressure = Pressure::from_mmhg(f64::NAN))),
+        ("flow_spread", CcoSettings { flow_spread: 1.0, ..base.clone() }),
+        ("flow_spread", CcoSettings { flow_spread: f32::NAN, ..base.clone() }),
         ("border_distance", CcoSettings { border_distance: -1.0, ..base.clone() }),
         ("candidates", CcoSettings { candidates: 0, ..base.clone() }),
         ("tolerance", CcoSettings { tolerance: f32::NAN, ..base.clone() }),
@@ -57,7 +64,7 @@ fn a_surface_a_distant_root_and_no_root_are_refused() {
     assert!(matches!(start(RootPlacement::Exact(vec![Vec3::NAN])), CcoError::Roots(_)));
     assert_eq!(start(RootPlacement::None), CcoError::NoRoot);
     let error = start(RootPlacement::Spread(2000));
-    assert!(matches!(error, CcoError::MoreRootsThanTerminals { roots: 2000, .. }), "{error}");
+    assert!(matches!(error, CcoError::TooFewTerminals { needed: 2000, .. }), "{error}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! A thousand grown networks: all tissues, both generators' presets, many seeds, three widths.
+//! A thousand grown networks: all tissues, all presets of space colonization, many seeds, three widths.
 
 use crate::common::tissues;
 use crate::measures::{meeting, sound_surface, union_volume, volume, widened};
@@ -6,7 +6,7 @@ use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::{Colonization, ColonizationSettings},
     mesh::{TriangleIndex, TriangleMesh},
-    preset::PresetName,
+    preset::{Preset, PresetName},
     surface::{Surface, SurfaceSettings},
     tree::{VesselKind, VesselTree},
 };
@@ -18,8 +18,9 @@ const NETWORKS: u64 = 500;
 fn grow(seed: u64) -> [VesselTree; 2] {
     let cases = tissues();
     let case = &cases[seed as usize % cases.len()];
-    let presets = PresetName::ALL;
-    let preset = presets[(seed as usize / cases.len()) % presets.len()].load();
+    let presets = PresetName::ALL.map(PresetName::load);
+    let presets: Vec<&Preset> = presets.iter().filter(|preset| preset.generator.colonization().is_some()).collect();
+    let preset = presets[(seed as usize / cases.len()) % presets.len()];
     let generator = preset.generator_for(case.tissue.extent());
     let settings = generator.colonization().expect("presets colonize").clone();
     let settings =

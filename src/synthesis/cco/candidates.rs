@@ -9,7 +9,7 @@
 use super::{
     distance::squared_to_segment,
     forest::NONE,
-    joint::Joint,
+    joint::{Joint, JointSums},
     paths::Paths,
     space::Space,
     sums::{Below, Slope},
@@ -36,6 +36,7 @@ pub(super) struct Candidate {
 pub(super) struct Guess {
     segment: u32,
     joint: Joint,
+    at_start: JointSums,
     slope: Slope,
     /// Less than what it costs.
     bound: f64,
@@ -84,11 +85,13 @@ impl Candidates {
         let most = space.domain.diagonal();
         self.reach = if self.reach > 0.0 { self.reach } else { 0.1 * most };
         loop {
-            let (found, square) = (&mut self.found, self.reach * self.reach);
+            let (found, reach) = (&mut self.found, self.reach);
+            let square = reach * reach;
             found.clear();
-            space.index.near(point, point, self.reach, |segment| {
+            space.index.near(point, point, reach, |segment| {
                 let node = space.forest.node(segment);
-                if may_join(node.tree) {
+                let end = reach + node.length;
+                if point.distance_squared(node.at.as_dvec3()) <= end * end && may_join(node.tree) {
                     let distance = squared_to_segment(point, space.forest.place(node.parent), node.at.as_dvec3());
                     if distance <= square {
                         found.push((distance, segment));
@@ -165,25 +168,26 @@ impl Space {
         debug_assert!(node.parent != NONE);
         let joint = Joint {
             ends: [forest.place(node.parent), node.at.as_dvec3(), point],
-            flows: [node.flow, 1.0],
+            flows: [node.flow, self.share],
             below: [node.below(forest.exponent), Below::default()],
             exponent: forest.exponent,
         };
         let start = joint.start();
-        let (volume, slope) = paths.ascend(forest, segment, joint.sums(start).trunk);
+        let at_start = joint.sums(start);
+        let (volume, slope) = paths.ascend(forest, segment, at_start.trunk, self.share);
         let before = forest.node(self.root_segment(node.tree)).sums.volume;
-        let bound = volume - before - PROMISE * joint.promise(start, &slope);
-        Guess { segment, joint, slope, bound: if bound.is_finite() { bound } else { f64::NEG_INFINITY } }
+        let bound = volume - before - PROMISE * joint.promise(start, &at_start, &slope);
+        Guess { segment, joint, at_start, slope, bound: if bound.is_finite() { bound } else { f64::NEG_INFINITY } }
     }
 
     /// The best way to connect a point to a segment; `None` if the new segments would be too short for their radii.
     pub(super) fn search(&self, guess: &Guess, tolerance: f64) -> Option<Candidate> {
-        let Guess { segment, joint, slope, .. } = guess;
+        let Guess { segment, joint, at_start, slope, .. } = guess;
         let (forest, node) = (&self.forest, self.forest.node(*segment));
         // Rounded, as it will be kept.
-        let place = joint.settle(joint.start(), slope, tolerance).as_vec3().as_dvec3();
+        let place = joint.settle(joint.start(), at_start, slope, tolerance).as_vec3().as_dvec3();
         let sums = joint.sums(place);
-        let ascent = forest.ascend(*segment, sums.trunk, 1.0);
+        let ascent = forest.ascend(*segment, sums.trunk, self.share);
         let trunk = self.unit[node.tree as usize] * ascent.root.load * ascent.thinning;
         let child = |child: usize| trunk * sums.children[child].load / sums.below.load;
         // 2r ≤ l, as fourth powers.

@@ -73,6 +73,8 @@ impl Space {
             let fits = self.clear(segment, 1.0);
             if fits {
                 self.strain_from(segment);
+            } else {
+                self.blocked = Some(segment);
             }
             fits
         });
@@ -82,14 +84,15 @@ impl Space {
 
     /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room for
     /// radii that are `reserve` times as wide.
-    fn clear(&mut self, segment: u32, reserve: f64) -> bool {
+    pub(super) fn clear(&mut self, segment: u32, reserve: f64) -> bool {
         let radius = self.radius(segment);
         let parent = self.forest.node(segment).parent;
         let ends = [self.forest.place(parent), self.forest.place(segment)];
         let is_entrance = self.forest.node(parent).parent == NONE;
         let mut bound = SLACK * radius;
-        if !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
-            bound = radius * APART;
+        let is_given = segment < self.given && parent < self.given;
+        if !is_given && !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
+            bound = radius * reserve.max(APART);
             if !self.domain.holds(ends[0], ends[1], bound, is_entrance) {
                 return false;
             }
@@ -97,13 +100,19 @@ impl Space {
         let mut tightened = std::mem::take(&mut self.tightened);
         tightened.clear();
         let mut has_room = true;
+        let (middle, half) = (ends[0].midpoint(ends[1]), 0.5 * ends[0].distance(ends[1]));
         self.index.near(ends[0], ends[1], bound, |other| {
+            let node = self.forest.node(other);
+            let sum = bound + f64::from(node.bound);
+            // Most are too far away, which one of their ends shows.
+            let reach = half + node.length + sum;
+            if middle.distance_squared(node.at.as_dvec3()) >= reach * reach {
+                return true;
+            }
             if other == segment || self.forest.are_incident(segment, other) {
                 return true;
             }
-            let node = self.forest.node(other);
             let other_ends = [self.forest.place(node.parent), node.at.as_dvec3()];
-            let sum = bound + f64::from(node.bound);
             let square = squared_between(ends, other_ends);
             if square >= sum * sum {
                 return true;
@@ -132,6 +141,32 @@ impl Space {
         }
         self.tightened = tightened;
         has_room
+    }
+
+    /// Number of pairs of segments that overlap without a common node.
+    pub(super) fn overlaps(&self) -> usize {
+        let segments = || (0..self.forest.nodes.len() as u32).filter(|&node| self.forest.node(node).parent != NONE);
+        let ends = |segment: u32| [self.forest.place(self.forest.node(segment).parent), self.forest.place(segment)];
+        let radii: Vec<f64> = (0..self.forest.nodes.len() as u32)
+            .map(|node| if self.forest.node(node).parent == NONE { 0.0 } else { self.radius(node) })
+            .collect();
+        let mut pairs = Vec::new();
+        for segment in segments() {
+            let [from, to] = ends(segment);
+            let radius = radii[segment as usize];
+            self.index.near(from, to, radius, |other| {
+                let sum = radius + radii[other as usize];
+                let is_pair = other < segment && !self.forest.are_incident(segment, other);
+                if is_pair && squared_between([from, to], ends(other)) < sum * sum {
+                    pairs.push((segment, other));
+                }
+                true
+            });
+        }
+        // Some may be visited twice.
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs.len()
     }
 
     /// Carries the strain of a changed segment up to the root. All radii on the way have changed.

@@ -1,21 +1,14 @@
 //! The tissue as a domain: how deep a point lies, and whether a segment stays inside.
 //!
-//! Depths of a mesh are searched for, so the domain keeps them at the centres of a grid. A depth changes by no more
-//! than the way between two points, so a value at a centre bounds those around it from both sides; only where the bound
-//! does not decide, near the border, the mesh is asked.
+//! Depths of a mesh are searched for, so the domain keeps some of them, which bound all others. Only where the bounds do
+//! not decide, near the border, the mesh is asked.
 
-use super::error::CcoError;
-use crate::synthesis::{
-    parallel,
-    tissue::{Extent, Tissue},
-};
+use super::depths::Depths;
+use super::{error::CcoError, power::cube_root, settings::CcoSettings};
+use crate::synthesis::tissue::{Extent, Tissue};
 use bevy_math::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// Cells of the grid along the longest side of the tissue.
-const RESOLUTION: f32 = 128.0;
-/// Those of the coarse grid that tells where a finer one is of use.
-const COARSE: f32 = 24.0;
 /// Excess of depth, as a share of what is needed, at which a segment that is traced counts as inside. It is the least
 /// step of the trace, too.
 const MARGIN: f64 = 0.01;
@@ -34,25 +27,17 @@ pub(super) struct Domain {
     pub axes: [DVec3; 3],
     /// Sides of that box; the last is 0 for an area.
     pub sides: DVec3,
-    border: f64,
-    grid: Option<DepthGrid>,
-}
-
-/// Depths at the centres of cells.
-#[derive(Clone, Debug)]
-struct DepthGrid {
-    corner: Vec3,
-    cell: f32,
-    size: [usize; 3],
-    depths: Vec<f32>,
+    /// Distance that vessels keep from the border.
+    pub border: f64,
+    depths: Option<Arc<Depths>>,
 }
 
 impl Domain {
-    /// A tissue whose vessels keep so far from its border.
+    /// A tissue whose vessels may touch its border.
     ///
     /// # Errors
     /// A tissue without an inside.
-    pub(super) fn new(tissue: Arc<dyn Tissue>, border: f32) -> Result<Self, CcoError> {
+    pub(super) fn new(tissue: Arc<dyn Tissue>) -> Result<Self, CcoError> {
         if tissue.stage(1).is_some() {
             return Err(CcoError::NoInside { tissue: "a tissue in stages" });
         }
@@ -91,17 +76,33 @@ impl Domain {
             sides.z = 0.0;
         }
         let corner = axes[0] * low.x + axes[1] * low.y + axes[2] * low.z;
-        let grid = tissue.depth_is_searched().then(|| DepthGrid::new(&*tissue, min, max));
-        Ok(Self { tissue, dimension, measure, corner, axes, sides, border: border.into(), grid })
+        let depths = tissue.depth_is_searched().then(|| Arc::new(Depths::new(&*tissue, min, max)));
+        Ok(Self { tissue, dimension, measure, corner, axes, sides, border: 0.0, depths })
     }
 
     pub(super) fn tissue(&self) -> &Arc<dyn Tissue> {
         &self.tissue
     }
 
+    /// Millimetres of a tissue length, if the whole tissue has its physical size.
+    pub(super) fn millimetres(&self, settings: &CcoSettings) -> f64 {
+        let share = f64::from(settings.perfusion) / self.measure;
+        if self.dimension == 2 { share.sqrt() } else { cube_root(share) }
+    }
+
     /// The diagonal of the tissue's box.
     pub(super) fn diagonal(&self) -> f64 {
         self.sides.length()
+    }
+
+    /// Density of terminals at a point, from 0 to 1.
+    pub(super) fn density(&self, point: DVec3) -> f64 {
+        self.tissue.density(point.as_vec3()).into()
+    }
+
+    /// Whether that is 1 everywhere.
+    pub(super) fn is_uniform(&self) -> bool {
+        self.tissue.is_uniform()
     }
 
     fn searched(&self, point: DVec3) -> f64 {
@@ -110,14 +111,8 @@ impl Domain {
 
     /// Bounds of the depth of a point: equal, unless they are on one side of `need`.
     fn depth_bounds(&self, point: DVec3, need: f64) -> [f64; 2] {
-        if let Some(grid) = &self.grid
-            && let Some([least, most]) = grid.bounds(point.as_vec3())
-            && (least > need + 0.25 * f64::from(grid.cell) || most < need)
-        {
-            return [least, most];
-        }
-        let depth = self.searched(point);
-        [depth, depth]
+        let known = self.depths.as_ref().and_then(|depths| depths.bounds(&*self.tissue, point.as_vec3(), need));
+        known.unwrap_or_else(|| [self.searched(point); 2])
     }
 
     /// Whether a point lies so deep in the tissue, and is not forbidden.
@@ -133,8 +128,8 @@ impl Domain {
 
     /// An upper bound of the depth of a point, and whether it may be reached by the tissue within `reach`.
     pub(super) fn may_be_within(&self, point: DVec3, reach: f64) -> bool {
-        match self.grid.as_ref().and_then(|grid| grid.bounds(point.as_vec3())) {
-            Some([_, most]) => most >= -reach,
+        match &self.depths {
+            Some(depths) => depths.may_be_above(&*self.tissue, point.as_vec3(), -reach),
             None => self.searched(point) >= -reach,
         }
     }
@@ -171,49 +166,5 @@ impl Domain {
                 return self.depth_bounds(to, enough)[0] >= enough;
             }
         }
-    }
-}
-
-impl DepthGrid {
-    /// Searches for depths inside and near the border; beyond, an upper bound by a coarse grid is enough.
-    fn new(tissue: &dyn Tissue, min: Vec3, max: Vec3) -> Self {
-        let search = |point| tissue.depth(point).unwrap_or(f32::NEG_INFINITY);
-        let coarse = Self::filled(min, max, COARSE, search);
-        let cell = (max - min).max_element() / RESOLUTION;
-        Self::filled(min, max, RESOLUTION, |point| match coarse.bounds(point) {
-            Some([_, most]) if most < f64::from(-2.0 * cell) => most as f32,
-            _ => search(point),
-        })
-    }
-
-    fn filled(min: Vec3, max: Vec3, resolution: f32, depth: impl Fn(Vec3) -> f32 + Sync) -> Self {
-        let cell = (max - min).max_element() / resolution;
-        let size = ((max - min) / cell).to_array().map(|count| (count.ceil() as usize).max(1));
-        let numbers: Vec<u32> = (0..(size[0] * size[1] * size[2]) as u32).collect();
-        let mut grid = Self { corner: min, cell, size, depths: Vec::new() };
-        let mut depths = Vec::new();
-        parallel::map_into(&numbers, &mut depths, 0.0, |&number| depth(grid.center(number as usize)));
-        grid.depths = depths;
-        grid
-    }
-
-    fn center(&self, number: usize) -> Vec3 {
-        let [x, y, _] = self.size;
-        let cell = Vec3::new((number % x) as f32, (number / x % y) as f32, (number / (x * y)) as f32);
-        self.corner + (cell + 0.5) * self.cell
-    }
-
-    /// The least and the largest depth that a point may have; `None` beside the grid.
-    fn bounds(&self, point: Vec3) -> Option<[f64; 2]> {
-        let local = (point - self.corner) / self.cell;
-        let cell = local.to_array().map(|value| value as usize);
-        let is_in = local.cmpge(Vec3::ZERO).all() && (0..3).all(|axis| cell[axis] < self.size[axis]);
-        if !is_in {
-            return None;
-        }
-        let number = (cell[2] * self.size[1] + cell[1]) * self.size[0] + cell[0];
-        let away = f64::from(point.distance(self.center(number)));
-        let depth = f64::from(self.depths[number]);
-        Some([depth - away, depth + away])
     }
 }

@@ -28,13 +28,64 @@ pub enum CcoSettingsError {
         /// The largest count.
         most: u32,
     },
-    /// Pressures between which no blood flows.
-    #[error("root_pressure is {root} Pa and terminal_pressure {terminal} Pa; the root's must be above the terminals'")]
+    /// A number of a kind's flow that is not above 0.
+    #[error("{name} of the {} vessels is {value}; it must be above 0", kind.name())]
+    Flow {
+        /// The kind in question.
+        kind: VesselKind,
+        /// Name of the field.
+        name: &'static str,
+        /// The value found.
+        value: f64,
+    },
+    /// Pressures between which nothing flows.
+    #[error(
+        "root_pressure of the {} vessels is {root} Pa and terminal_pressure {terminal} Pa; the root's must be above the \
+         terminals'",
+        kind.name()
+    )]
     Pressures {
+        /// The kind in question.
+        kind: VesselKind,
         /// Pressure at the root, in pascals.
         root: f64,
         /// Pressure at the terminals, in pascals.
         terminal: f64,
+    },
+}
+
+/// What is wrong with a node of a given tree, from which constrained constructive optimisation cannot continue.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GivenTreeError {
+    /// The tree itself is not valid.
+    #[error("cannot be used, since the tree is not valid: {reason}")]
+    Invalid {
+        /// What is wrong.
+        reason: String,
+    },
+    /// More children than this generator knows.
+    #[error(
+        "has more than {most} children; vessels must bifurcate, and a root must have one child: divide it in two nodes, or \
+         give each root vessel its own root"
+    )]
+    TooManyChildren {
+        /// Most children that it may have.
+        most: u32,
+    },
+    /// A root without a vessel.
+    #[error("is a root without a vessel; remove it, and place a root there")]
+    NoVessel,
+    /// A segment without length.
+    #[error("is where its parent is; merge the two")]
+    NoLength,
+    /// A vessel that overlaps another one.
+    #[error(
+        "ends a vessel that overlaps another one at a radius of {radius} tissue lengths; raise perfusion, lower the flow \
+         or move it"
+    )]
+    Overlaps {
+        /// The radius that it would have.
+        radius: f32,
     },
 }
 
@@ -59,21 +110,28 @@ pub enum CcoError {
     /// No kind of vessels has a root.
     #[error("there is no root; place at least one")]
     NoRoot,
-    /// A given tree, from which this generator cannot grow yet.
-    #[error("the {} vessels have a given tree; this generator grows from roots only: give it none", kind.name())]
+    /// A given tree from which growth cannot continue.
+    #[error("node {node} of the given {} tree {reason}", kind.name())]
     GivenTree {
         /// The kind in question.
         kind: VesselKind,
+        /// The node in the given tree.
+        node: u32,
+        /// What is wrong with it.
+        reason: GivenTreeError,
     },
     /// Fewer terminals than roots.
-    #[error("{terminals} terminals are too few for {roots} roots of the {} vessels; each needs one", kind.name())]
-    MoreRootsThanTerminals {
+    #[error(
+        "{terminals} terminals are too few for the {} vessels, whose roots and given trees need {needed}; raise terminals",
+        kind.name()
+    )]
+    TooFewTerminals {
         /// The kind in question.
         kind: VesselKind,
         /// Terminals wanted.
         terminals: u32,
-        /// Its roots.
-        roots: usize,
+        /// One for each root, and those of given trees.
+        needed: usize,
     },
     /// A root from which no first vessel fits into the tissue.
     #[error(

@@ -15,17 +15,18 @@ use bevy_math::{DVec3, Vec3};
 /// No node.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// A node, and the segment that ends in it. A root node has no parent, no segment and one child.
+/// A node, and the segment that ends in it. A root node has no parent, no segment and one child; only a given tree has
+/// others with one child.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     /// Its position, in tissue lengths.
     pub at: Vec3,
     pub parent: u32,
-    /// None, one (of a root) or two.
+    /// None, one or two.
     pub children: [u32; 2],
     /// Number of the tree.
     pub tree: u32,
-    /// Number of terminals at and below it.
+    /// Flow of the terminals at and below it, in that of a mean terminal.
     pub flow: f64,
     /// Length of the segment.
     pub length: f64,
@@ -39,13 +40,13 @@ pub(super) struct Node {
 
 impl Node {
     /// A node without children whose sums are not known yet.
-    pub(super) fn new(at: Vec3, parent: u32, tree: u32) -> Self {
+    pub(super) fn new(at: Vec3, parent: u32, tree: u32, flow: f64) -> Self {
         Self {
             at,
             parent,
             children: [NONE; 2],
             tree,
-            flow: 1.0,
+            flow,
             length: 0.0,
             sums: Sums::default(),
             bound: f32::INFINITY,
@@ -104,10 +105,15 @@ impl Forest {
         self.node(node).at.as_dvec3()
     }
 
-    /// The other child of a segment's parent; `NONE` below a root.
-    pub(super) fn sister(&self, node: u32) -> u32 {
+    /// Sums of a node; zero for `NONE`.
+    pub(super) fn sums(&self, node: u32) -> Sums {
+        if node == NONE { Sums::default() } else { self.node(node).sums }
+    }
+
+    /// Sums of the other child of a segment's parent; zero without one.
+    pub(super) fn sister(&self, node: u32) -> Sums {
         let [a, b] = self.node(self.node(node).parent).children;
-        if a == node { b } else { a }
+        self.sums(if a == node { b } else { a })
     }
 
     /// Whether two segments share a node.
@@ -125,7 +131,7 @@ impl Forest {
             if node.parent == NONE {
                 return Ascent { root: sums, slope, thinning };
             }
-            let below = Below::join(&sums, &self.node(self.sister(child)).sums, self.exponent);
+            let below = Below::join(&sums, &self.sister(child), self.exponent);
             let above = Sums::of(node.flow + gain, node.length, &below, self.exponent);
             slope.rise(&sums, &below, &above);
             thinning *= sums.load / below.load;

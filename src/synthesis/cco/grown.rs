@@ -34,8 +34,8 @@ impl Grown {
                 NO_PARENT => self.tree.push_root(own.at, radius),
                 parent => self.tree.push_child(NodeId(parent), own.at, radius),
             };
-            // Two nodes are born in each step.
-            self.birth_steps.push(node / 2 + 1);
+            // Two nodes are born in each step, after the given ones.
+            self.birth_steps.push(node.checked_sub(space.given).map_or(0, |born| born / 2 + 1));
             let children = own.children.iter().rev().filter(|&&child| child != NONE);
             self.stack.extend(children.map(|&child| (child, id.0, fourth)));
         }

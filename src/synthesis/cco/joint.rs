@@ -14,11 +14,9 @@ use bevy_math::{DMat3, DVec3};
 
 /// Most steps of the search. Newton's method takes three to five.
 const MOST_STEPS: usize = 100;
-/// Length of a segment, as a share of the longest, below which a joint counts as at an end.
-const AT_END: f64 = 2.0e-3;
-/// Steps at an end after which the search is over: the best place is the end itself, where the volume has a cusp, and the
-/// joint will be refused since a segment is too short.
-const STEPS_AT_END: usize = 10;
+/// Length of a segment, as a share of the longest, below which the best place may be its end itself, where the volume has
+/// a cusp that steps approach slowly.
+const NEAR_END: f64 = 0.15;
 /// Halvings of a step that does not lower the volume.
 const HALVINGS: usize = 12;
 /// Least length of a segment, as a share of the joint's size: a pull has no direction at its end.
@@ -89,10 +87,10 @@ impl Joint {
     /// The volume depends on the trunk's sums as `slope` says, to first order. Each step is Newton's, or else one
     /// against the gradient, and is halved while it does not lower the volume: the result is never worse than the
     /// start. The search ends when a step would gain less than `tolerance` times what the second child's segment costs.
-    pub(super) fn settle(&self, start: DVec3, slope: &Slope, tolerance: f64) -> DVec3 {
+    pub(super) fn settle(&self, start: DVec3, at_start: &JointSums, slope: &Slope, tolerance: f64) -> DVec3 {
         let cost = |sums: &JointSums| slope.load * sums.trunk.load + slope.volume * sums.trunk.volume;
-        let (mut place, mut sums) = (start, self.sums(start));
-        let (mut least, mut steps_at_end) = (cost(&sums), 0);
+        let (mut place, mut sums) = (start, *at_start);
+        let (mut least, mut is_tested) = (cost(&sums), [false; 3]);
         for _ in 0..MOST_STEPS {
             let Some(Step { way, plain, gain, scale }) = self.step(place, &sums, slope) else { break };
             if gain <= tolerance * scale {
@@ -104,18 +102,30 @@ impl Joint {
                 tries.map(|step| (place + step, self.sums(place + step))).find(|(_, there)| cost(there) < least);
             let Some((next, there)) = found else { break };
             (place, sums, least) = (next, there, cost(&there));
-            let (shortest, longest) = sums.lengths.iter().fold((f64::MAX, 0.0f64), |(a, b), &l| (a.min(l), b.max(l)));
-            steps_at_end += usize::from(shortest < AT_END * longest);
-            if steps_at_end > STEPS_AT_END {
-                break;
+            let longest = sums.lengths.into_iter().fold(0.0, f64::max);
+            let is_near = |end: &usize| sums.lengths[*end] < NEAR_END * longest;
+            if let Some(end) = (0..3).find(is_near).filter(|&end| !std::mem::replace(&mut is_tested[end], true))
+                && self.rests_at(end, slope)
+            {
+                return self.ends[end];
             }
         }
         place
     }
 
+    /// Whether the joint would stay at an end: the others pull no more than that end does.
+    fn rests_at(&self, end: usize, slope: &Slope) -> bool {
+        let place = self.ends[end];
+        let sums = self.sums(place);
+        let pulls = self.pulls(&sums, slope);
+        let others = (0..3).filter(|&other| other != end);
+        let pull: DVec3 = others.map(|other| (self.ends[other] - place) * (pulls[other] / sums.lengths[other])).sum();
+        pull.length_squared() <= pulls[end] * pulls[end]
+    }
+
     /// What the first step of a search would gain.
-    pub(super) fn promise(&self, start: DVec3, slope: &Slope) -> f64 {
-        self.step(start, &self.sums(start), slope).map_or(f64::INFINITY, |step| step.gain)
+    pub(super) fn promise(&self, start: DVec3, at_start: &JointSums, slope: &Slope) -> f64 {
+        self.step(start, at_start, slope).map_or(f64::INFINITY, |step| step.gain)
     }
 
     /// Newton's step; a step against the gradient where that leads nowhere.

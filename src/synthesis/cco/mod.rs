@@ -20,16 +20,20 @@
 mod candidates;
 mod cell_map;
 mod clearance;
+mod depths;
 mod distance;
 mod domain;
 mod error;
 mod forest;
+mod given;
 mod grown;
 mod index;
 mod joint;
+mod links;
 mod paths;
 mod polish;
 mod power;
+mod relief;
 mod report;
 mod seam;
 mod settings;
@@ -40,16 +44,16 @@ mod system;
 mod tests;
 mod vacancy;
 
-pub use error::{CcoError, CcoSettingsError};
+pub use error::{CcoError, CcoSettingsError, GivenTreeError};
 pub use report::CcoReport;
-pub use settings::CcoSettings;
+pub use settings::{CcoSettings, VesselFlow};
 
 use crate::synthesis::{
     growth::StepCount,
     random::{Stream, VesselRng},
     roots::Roots,
-    tissue::Tissue,
-    tree::{ByKind, VesselKind, VesselTree},
+    tissue::{Tissue, TissuePoint},
+    tree::{BedLink, ByKind, VesselKind, VesselTree},
 };
 use domain::Domain;
 use forest::Forest;
@@ -105,25 +109,36 @@ pub struct Cco {
     /// Number of nodes from which on a sweep is due while the trees grow.
     due: usize,
     grown: ByKind<Option<Grown>>,
+    /// Links between the terminals of arteries and veins, once all are placed.
+    links: Vec<BedLink>,
 }
 
 impl Cco {
-    /// Prepares a growth with the first vessel of each root. Lengths in the settings are the tissue's: see
+    /// Prepares a growth with given trees and the first vessel of each root. Lengths in the settings are the tissue's: see
     /// [`CcoSettings::fit`].
     ///
     /// # Errors
     /// A setting outside its limits; a tissue that is neither flat nor solid; roots that cannot be placed as requested,
-    /// that have no room for a vessel, or of which there are none.
+    /// that have no room for a vessel, or of which there are none; a given tree that is no binary one, or overlaps.
     pub fn new(tissue: Arc<dyn Tissue>, settings: CcoSettings, roots: &Roots, seed: u64) -> Result<Self, CcoError> {
         settings.validate()?;
-        let domain = Domain::new(Arc::clone(&tissue), settings.border_distance)?;
-        for (kind, given) in roots.given.iter() {
-            if given.as_ref().is_some_and(|tree| !tree.is_empty()) {
-                return Err(CcoError::GivenTree { kind });
-            }
-        }
-        let spacing = settings.root_spacing(tissue.extent().equivalent_diameter());
-        let placed = roots.resolve(&*tissue, &spacing, seed)?;
+        Self::on(Domain::new(tissue)?, settings, roots, seed)
+    }
+
+    /// Starts again on the same tissue with other settings, roots or seed. What is known of its border stays.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new); the growth is unchanged then.
+    pub fn restart(&mut self, settings: CcoSettings, roots: &Roots, seed: u64) -> Result<(), CcoError> {
+        settings.validate()?;
+        *self = Self::on(self.space.domain.clone(), settings, roots, seed)?;
+        Ok(())
+    }
+
+    fn on(mut domain: Domain, settings: CcoSettings, roots: &Roots, seed: u64) -> Result<Self, CcoError> {
+        domain.border = settings.border_distance.into();
+        let tissue = domain.tissue();
+        let placed = roots.resolve(&**tissue, &settings.root_spacing(tissue.extent()), seed)?;
         let exponent = Exponent::new(settings.bifurcation_exponent.into());
         let mut growth = Self {
             space: Space::new(domain, Forest::new(exponent)),
@@ -133,29 +148,49 @@ impl Cco {
             polished: [0; 2],
             due: FIRST_SWEEP,
             grown: ByKind::default(),
+            links: Vec::new(),
             settings,
         };
-        for (kind, roots) in placed.iter().filter(|(_, roots)| !roots.is_empty()) {
-            if roots.len() > growth.settings.terminals as usize {
-                let (terminals, roots) = (growth.settings.terminals, roots.len());
-                return Err(CcoError::MoreRootsThanTerminals { kind, terminals, roots });
+        for (kind, placed) in placed.iter() {
+            let given = roots.given[kind].as_ref().filter(|tree| !tree.is_empty());
+            let needed = placed.len() + given.map_or(0, |tree| tree.tips().len());
+            let terminals = growth.settings.terminals;
+            if needed > terminals as usize {
+                return Err(CcoError::TooFewTerminals { kind, terminals, needed });
             }
-            growth.systems.push(System::new(kind, &growth.space.domain, &growth.settings));
+            if needed > 0 {
+                growth.systems.push(System::new(kind, &growth.space.domain, &growth.settings));
+            }
         }
         if growth.systems.is_empty() {
             return Err(CcoError::NoRoot);
         }
-        let nodes = 2 * growth.settings.terminals as usize * growth.systems.len();
-        growth.space.forest.nodes.reserve_exact(nodes);
-        growth.space.index.reserve(nodes);
-        for system in &mut growth.systems {
-            for root in &placed[system.kind] {
-                system.plant(&mut growth.space, root.position, &growth.settings, &mut growth.rng)?;
-                growth.steps += 1;
-            }
-        }
+        growth.plant(&placed, roots)?;
         growth.settle();
         Ok(growth)
+    }
+
+    /// Takes over the given trees of all kinds, then plants all roots.
+    fn plant(&mut self, placed: &ByKind<Vec<TissuePoint>>, roots: &Roots) -> Result<(), CcoError> {
+        let Self { space, systems, settings, rng, .. } = self;
+        let given = |kind| roots.given[kind].as_ref().filter(|tree| !tree.is_empty());
+        let nodes = systems.iter().map(|system| given(system.kind).map_or(0, VesselTree::len)).sum::<usize>()
+            + 2 * settings.terminals as usize * systems.len();
+        space.forest.nodes.reserve_exact(nodes);
+        space.index.reserve(nodes);
+        for system in systems.iter_mut() {
+            if let Some(tree) = given(system.kind) {
+                system.adopt(space, tree, settings, rng)?;
+            }
+        }
+        for system in systems.iter_mut() {
+            for root in &placed[system.kind] {
+                system.plant(space, root.position, settings, rng)?;
+                self.steps += 1;
+            }
+        }
+        self.due = FIRST_SWEEP.max(2 * space.forest.nodes.len());
+        Ok(())
     }
 
     /// Does one step: connects the next terminal, of the kind that has fewest, or looks at some bifurcations once all
@@ -240,6 +275,17 @@ impl Cco {
         for system in &self.systems {
             self.grown[system.kind].get_or_insert_default().settle(&self.space, &system.trees);
         }
+        self.links.clear();
+        if self.is_finished() {
+            self.links = links::links(self.tree(VesselKind::Artery), self.tree(VesselKind::Vein));
+        }
+    }
+
+    /// Links through which blood flows from the arteries to the veins, at the end of growth: from each terminal to the
+    /// nearest one of the other tree. They join the two trees to one circulation
+    /// ([`Circulation`](crate::synthesis::haemodynamics::Circulation)).
+    pub fn bed_links(&self) -> &[BedLink] {
+        &self.links
     }
 
     /// The steps done, and all of them: one for each terminal, and those of polishing.
@@ -266,6 +312,17 @@ impl Cco {
     /// What each kind has reached.
     pub fn reports(&self) -> impl Iterator<Item = CcoReport> + '_ {
         self.systems.iter().map(|system| system.report(&self.space, &self.settings))
+    }
+
+    /// Millimetres of a tissue length, once the domain has its full size.
+    pub fn millimetres(&self) -> f64 {
+        self.space.domain.millimetres(&self.settings)
+    }
+
+    /// Number of pairs of segments, of the same tree or of two, that overlap as cylinders with round ends though they
+    /// share no node. It is 0, unless a given tree was so: a check of all that is promised.
+    pub fn overlaps(&self) -> usize {
+        self.space.overlaps()
     }
 
     /// The settings in force.

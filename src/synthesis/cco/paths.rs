@@ -43,8 +43,8 @@ impl Paths {
         self.steps.get(self.step_of[segment as usize] as usize).filter(|step| step.segment == segment)
     }
 
-    /// Volume of the tree if a segment, which gains a terminal, had other sums, and how it depends on them.
-    pub(super) fn ascend(&mut self, forest: &Forest, mut segment: u32, mut sums: Sums) -> (f64, Slope) {
+    /// Volume of the tree if a segment, which gains so much flow, had other sums, and how it depends on them.
+    pub(super) fn ascend(&mut self, forest: &Forest, mut segment: u32, mut sums: Sums, gain: f64) -> (f64, Slope) {
         self.way.clear();
         let mut slope = Slope::ROOT;
         let (volume, whole) = loop {
@@ -59,8 +59,8 @@ impl Paths {
             if node.parent == NONE {
                 break (sums.volume, slope);
             }
-            let below = Below::join(&sums, &forest.node(forest.sister(segment)).sums, forest.exponent);
-            let above = Sums::of(node.flow + 1.0, node.length, &below, forest.exponent);
+            let below = Below::join(&sums, &forest.sister(segment), forest.exponent);
+            let above = Sums::of(node.flow + gain, node.length, &below, forest.exponent);
             slope.rise(&sums, &below, &above);
             (segment, sums) = (parent, above);
         };

@@ -6,12 +6,17 @@
 use super::Cco;
 use crate::synthesis::{
     growth::{GrownTree, Growth, GrowthWarning, StepCount, TreeUpdate},
-    tree::{ByKind, VesselKind},
+    tree::{BedLink, ByKind, VesselKind},
 };
 
 impl Growth for Cco {
     fn advance(&mut self) {
         self.advance();
+    }
+
+    fn run(&mut self) {
+        // Whatever had no room is told by the warnings.
+        drop(self.run());
     }
 
     fn settle(&mut self) {
@@ -42,6 +47,10 @@ impl Growth for Cco {
 
     fn update(&self, _: VesselKind) -> TreeUpdate<'_> {
         TreeUpdate::Replaced
+    }
+
+    fn bed_links(&self) -> &[BedLink] {
+        self.bed_links()
     }
 
     fn warnings(&self) -> Vec<GrowthWarning> {

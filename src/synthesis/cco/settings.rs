@@ -37,22 +37,17 @@ pub struct CcoSettings {
     ///
     /// Limits: 2 to 4. Default: [`Self::DEFAULT_BIFURCATION_EXPONENT`].
     pub bifurcation_exponent: f32,
-    /// Viscosity µ of the blood. Higher values give wider vessels.
+    /// Flow, pressures and viscosity of each kind of vessels. Kinds without a root don't matter.
     ///
-    /// Limits: > 0. Default: [`Self::DEFAULT_VISCOSITY`].
-    pub viscosity: Viscosity,
-    /// Flow Q through all terminals of a kind together. Higher values give wider vessels.
+    /// Default: [`VesselFlow::default`] for all kinds.
+    pub flow: ByKind<VesselFlow>,
+    /// Spread of the flows of the terminals, as a share of their mean: each has a flow from 1 − spread to 1 + spread times
+    /// the mean, at random.
     ///
-    /// Limits: > 0. Default: [`Self::DEFAULT_FLOW`].
-    pub flow: Flow,
-    /// Pressure `P_in` at the root: the higher end of the pressure loss, in whichever direction blood flows.
+    /// Higher values give terminals of more different widths. 0 gives all the same flow, as OpenCCO does.
     ///
-    /// Limits: above [`terminal_pressure`](Self::terminal_pressure). Default: [`Self::DEFAULT_ROOT_PRESSURE`].
-    pub root_pressure: Pressure,
-    /// Pressure `P_out` at every terminal. The nearer it is to the root's, the wider are the vessels.
-    ///
-    /// Limits: below [`root_pressure`](Self::root_pressure). Default: [`Self::DEFAULT_TERMINAL_PRESSURE`].
-    pub terminal_pressure: Pressure,
+    /// Limits: 0 to [`Self::MAX_FLOW_SPREAD`]. Default: 0.
+    pub flow_spread: f32,
     /// Least distance between the wall of a vessel and the border of the tissue.
     ///
     /// Units: tissue lengths. Limits: ≥ 0. Default: 0.
@@ -77,6 +72,67 @@ pub struct CcoSettings {
     pub polish_sweeps: u32,
 }
 
+/// What flows through all vessels of one kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serialize", serde(default, deny_unknown_fields))]
+#[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect))]
+pub struct VesselFlow {
+    /// Flow Q through all terminals together. Higher values give wider vessels.
+    ///
+    /// Limits: > 0. Default: [`Self::DEFAULT_RATE`].
+    pub rate: Flow,
+    /// Viscosity µ of what flows. Higher values give wider vessels.
+    ///
+    /// Limits: > 0. Default: [`Self::DEFAULT_VISCOSITY`].
+    pub viscosity: Viscosity,
+    /// Pressure `P_in` at the root: the higher end of the pressure loss, in whichever direction it flows.
+    ///
+    /// Limits: above [`terminal_pressure`](Self::terminal_pressure). Default: [`Self::DEFAULT_ROOT_PRESSURE`].
+    pub root_pressure: Pressure,
+    /// Pressure `P_out` at every terminal. The nearer it is to the root's, the wider are the vessels.
+    ///
+    /// Limits: below [`root_pressure`](Self::root_pressure). Default: [`Self::DEFAULT_TERMINAL_PRESSURE`].
+    pub terminal_pressure: Pressure,
+}
+
+impl VesselFlow {
+    /// Q of OpenCCO: 8330 mm³/s.
+    pub const DEFAULT_RATE: Flow = Flow::from_cubic_metres_per_second(8.33e-6);
+    /// µ of OpenCCO: 3.6 mPa·s.
+    pub const DEFAULT_VISCOSITY: Viscosity = Viscosity::from_centipoise(3.6);
+    /// `P_in` of OpenCCO: 13,300 Pa, which is 100 mmHg.
+    pub const DEFAULT_ROOT_PRESSURE: Pressure = Pressure::from_pascals(13_300.0);
+    /// `P_out` of OpenCCO for more than 250 terminals, 7980 Pa. For fewer it takes 8400 Pa.
+    pub const DEFAULT_TERMINAL_PRESSURE: Pressure = Pressure::from_pascals(7980.0);
+
+    fn validate(&self, kind: VesselKind) -> Result<(), CcoSettingsError> {
+        let positive = |name, value: f64| {
+            let is_good = value.is_finite() && value > 0.0;
+            if is_good { Ok(()) } else { Err(CcoSettingsError::Flow { kind, name, value }) }
+        };
+        positive("rate, in m³/s,", self.rate.cubic_metres_per_second())?;
+        positive("viscosity, in Pa·s,", self.viscosity.pascal_seconds())?;
+        let (root, terminal) = (self.root_pressure.pascals(), self.terminal_pressure.pascals());
+        if root.is_finite() && terminal.is_finite() && root > terminal {
+            Ok(())
+        } else {
+            Err(CcoSettingsError::Pressures { kind, root, terminal })
+        }
+    }
+}
+
+impl Default for VesselFlow {
+    fn default() -> Self {
+        Self {
+            rate: Self::DEFAULT_RATE,
+            viscosity: Self::DEFAULT_VISCOSITY,
+            root_pressure: Self::DEFAULT_ROOT_PRESSURE,
+            terminal_pressure: Self::DEFAULT_TERMINAL_PRESSURE,
+        }
+    }
+}
+
 impl CcoSettings {
     /// Default number of terminals of OpenCCO.
     pub const DEFAULT_TERMINALS: u32 = 1000;
@@ -86,14 +142,8 @@ impl CcoSettings {
     pub const DEFAULT_PERFUSION: f32 = 20_000.0;
     /// γ of OpenCCO.
     pub const DEFAULT_BIFURCATION_EXPONENT: f32 = 3.0;
-    /// µ of OpenCCO: 3.6 mPa·s.
-    pub const DEFAULT_VISCOSITY: Viscosity = Viscosity::from_centipoise(3.6);
-    /// Q of OpenCCO: 8330 mm³/s.
-    pub const DEFAULT_FLOW: Flow = Flow::from_cubic_metres_per_second(8.33e-6);
-    /// `P_in` of OpenCCO: 13,300 Pa, which is 100 mmHg.
-    pub const DEFAULT_ROOT_PRESSURE: Pressure = Pressure::from_pascals(13_300.0);
-    /// `P_out` of OpenCCO for more than 250 terminals, 7980 Pa. For fewer it takes 8400 Pa.
-    pub const DEFAULT_TERMINAL_PRESSURE: Pressure = Pressure::from_pascals(7980.0);
+    /// Highest spread of terminal flows: above it some terminals would have hardly any.
+    pub const MAX_FLOW_SPREAD: f32 = 0.9;
     /// `N_con` of OpenCCO.
     pub const DEFAULT_CANDIDATES: u32 = 20;
     /// How often the number of candidates is doubled for one terminal.
@@ -121,16 +171,13 @@ impl CcoSettings {
         positive("perfusion", self.perfusion.into())?;
         let gamma = f64::from(self.bifurcation_exponent);
         range("bifurcation_exponent", gamma, "from 2 to 4", (2.0..=4.0).contains(&gamma))?;
-        positive("viscosity, in Pa·s,", self.viscosity.pascal_seconds())?;
-        positive("flow, in m³/s,", self.flow.cubic_metres_per_second())?;
+        let spread = f64::from(self.flow_spread);
+        range("flow_spread", spread, "from 0 to 0.9", (0.0..=0.9000001).contains(&spread))?;
+        self.flow.iter().try_for_each(|(kind, flow)| flow.validate(kind))?;
         let border = f64::from(self.border_distance);
         range("border_distance", border, "0 or more", border >= 0.0)?;
         let tolerance = f64::from(self.tolerance);
         range("tolerance", tolerance, "from 1e-12 to 0.1", (0.99e-12..=0.101).contains(&tolerance))?;
-        let (root, terminal) = (self.root_pressure.pascals(), self.terminal_pressure.pascals());
-        if !(root.is_finite() && terminal.is_finite() && root > terminal) {
-            return Err(CcoSettingsError::Pressures { root, terminal });
-        }
         let mut warnings = Vec::new();
         if self.terminals == 1 {
             warnings.push(GrowthWarning::new("one terminal gives one straight vessel without a bifurcation"));
@@ -157,8 +204,9 @@ impl CcoSettings {
         self.scaled(extent.equivalent_diameter())
     }
 
-    /// The spacing of roots in a tissue of equivalent diameter `diameter`: any kind may have roots.
-    pub fn root_spacing(&self, diameter: f32) -> ByKind<Option<RootSpacing>> {
+    /// The spacing of roots in a tissue of this extent: any kind may have roots.
+    pub fn root_spacing(&self, extent: Extent) -> ByKind<Option<RootSpacing>> {
+        let diameter = extent.equivalent_diameter();
         let spacing = RootSpacing { step: Self::ROOT_STEP * diameter, reach: Self::ROOT_REACH * diameter };
         ByKind::from_fn(|_: VesselKind| Some(spacing))
     }
@@ -175,10 +223,8 @@ impl Default for CcoSettings {
             terminals: Self::DEFAULT_TERMINALS,
             perfusion: Self::DEFAULT_PERFUSION,
             bifurcation_exponent: Self::DEFAULT_BIFURCATION_EXPONENT,
-            viscosity: Self::DEFAULT_VISCOSITY,
-            flow: Self::DEFAULT_FLOW,
-            root_pressure: Self::DEFAULT_ROOT_PRESSURE,
-            terminal_pressure: Self::DEFAULT_TERMINAL_PRESSURE,
+            flow: ByKind::default(),
+            flow_spread: 0.0,
             border_distance: 0.0,
             candidates: Self::DEFAULT_CANDIDATES,
             tolerance: Self::DEFAULT_TOLERANCE,

@@ -21,8 +21,14 @@ pub(super) struct Space {
     pub unit: Vec<f64>,
     /// The root node of each tree.
     pub roots: Vec<u32>,
+    /// Flow of the next terminal, in that of a mean one.
+    pub share: f64,
+    /// Number of the first nodes, those of given trees, which stay where they are.
+    pub given: u32,
     /// Factor of the radii for which new segments must have room: what they are expected to grow by.
     pub reserve: f64,
+    /// The last segment that had to become wider and had no room, of those before a change.
+    pub blocked: Option<u32>,
     /// Nodes as they were before a change, in the order in which they were changed.
     pub(super) before: Vec<(u32, Node)>,
     /// Number of nodes before the change.
@@ -47,7 +53,10 @@ impl Space {
             forest,
             unit: Vec::new(),
             roots: Vec::new(),
+            share: 1.0,
+            given: 0,
             reserve: 1.0,
+            blocked: None,
             before: Vec::new(),
             nodes_before: 0,
             moved: Vec::new(),
@@ -102,10 +111,10 @@ impl Space {
     /// Adds a tree with one segment.
     pub(super) fn plant(&mut self, root: DVec3, terminal: DVec3, unit: f64) -> [u32; 2] {
         let (tree, first) = (self.roots.len() as u32, self.forest.nodes.len() as u32);
-        let mut node = Node::new(root.as_vec3(), NONE, tree);
+        let mut node = Node::new(root.as_vec3(), NONE, tree, self.share);
         node.children[0] = first + 1;
         self.forest.nodes.push(node);
-        self.forest.nodes.push(Node::new(terminal.as_vec3(), first, tree));
+        self.forest.nodes.push(Node::new(terminal.as_vec3(), first, tree, self.share));
         self.roots.push(first);
         self.unit.push(unit);
         self.measure(first + 1, &Below::default());
@@ -127,8 +136,8 @@ impl Space {
         let joint = self.forest.nodes.len() as u32;
         let below = self.forest.node(segment).below(self.forest.exponent);
         self.index.remove(segment);
-        self.forest.nodes.push(Node::new(place.as_vec3(), parent, tree));
-        self.forest.nodes.push(Node::new(terminal.as_vec3(), joint, tree));
+        self.forest.nodes.push(Node::new(place.as_vec3(), parent, tree, 0.0));
+        self.forest.nodes.push(Node::new(terminal.as_vec3(), joint, tree, self.share));
         let children = &mut self.change(parent).children;
         children[usize::from(children[0] != segment)] = joint;
         self.change(segment).parent = joint;
@@ -137,7 +146,7 @@ impl Space {
         let flow = self.forest.node(segment).flow;
         let node = self.forest.node_mut(joint);
         (node.children, node.flow) = ([segment, joint + 1], flow);
-        self.carry(joint, 1.0);
+        self.carry(joint, self.share);
         self.enter(&[joint, segment, joint + 1]);
         [joint, joint + 1]
     }
@@ -159,7 +168,7 @@ impl Space {
     }
 
     /// Sets length and sums of a segment, whose node may be changed.
-    fn measure(&mut self, segment: u32, below: &Below) {
+    pub(super) fn measure(&mut self, segment: u32, below: &Below) {
         let exponent = self.forest.exponent;
         let length = self.forest.place(segment).distance(self.forest.place(self.forest.node(segment).parent));
         let node = self.forest.node_mut(segment);
@@ -175,7 +184,7 @@ impl Space {
         self.change(joint).length = length;
         loop {
             let [a, b] = self.forest.node(joint).children;
-            let below = Below::join(&self.forest.node(a).sums, &self.forest.node(b).sums, exponent);
+            let below = Below::join(&self.forest.sums(a), &self.forest.sums(b), exponent);
             let node = self.change(joint);
             node.flow += gain;
             node.sums = Sums::of(node.flow, node.length, &below, exponent);
@@ -187,7 +196,7 @@ impl Space {
     }
 
     /// Puts changed segments into the index, with the widest bounds that they may get.
-    fn enter(&mut self, segments: &[u32]) {
+    pub(super) fn enter(&mut self, segments: &[u32]) {
         for &segment in segments {
             let bound = SLACK * self.radius(segment);
             self.forest.node_mut(segment).bound = bound as f32;

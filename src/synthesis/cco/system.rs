@@ -4,14 +4,17 @@ use super::{
     candidates::{Attempt, Candidates},
     domain::Domain,
     error::CcoError,
-    power::cube_root,
     report::CcoReport,
-    settings::CcoSettings,
+    settings::{CcoSettings, VesselFlow},
     space::Space,
     vacancy::Vacancy,
 };
-use crate::synthesis::{random::VesselRng, tree::VesselKind};
+use crate::synthesis::{
+    random::VesselRng,
+    tree::{VesselKind, VesselTree},
+};
 use bevy_math::{DVec3, Vec3};
+use rand::RngExt;
 use std::f64::consts::PI;
 
 /// Places from which the end of the first vessel is chosen.
@@ -19,6 +22,8 @@ const FIRST_PLACES: usize = 64;
 /// Room for growth that the first segments get, as a share of their radii. Vessels that touch early are in the way of
 /// all later terminals, since trunks become wider with each.
 const RESERVE: f64 = 0.1;
+/// Flows of terminals are multiples of this share of the mean, so that their sums are exact.
+const FLOW_UNIT: f64 = 1.0 / 1_048_576.0;
 /// Places refused in a row after which a kind has no room for more.
 const MOST_REFUSED: u32 = 500;
 
@@ -35,19 +40,22 @@ pub(super) struct System {
     pub is_stuck: bool,
     vacancy: Vacancy,
     candidates: Candidates,
+    /// Excess of the next terminal's flow over the mean, if that is decided, in units.
+    excess: Option<f64>,
+    /// Segments that no move gives room.
+    stuck: Vec<u32>,
     /// 8µQ/(πk·ΔP·s³): the unit of a radius's fourth power once the domain has its full size.
     unit: f64,
 }
 
 impl System {
     pub(super) fn new(kind: VesselKind, domain: &Domain, settings: &CcoSettings) -> Self {
-        // Millimetres of a tissue length in the full domain.
-        let share = f64::from(settings.perfusion) / domain.measure;
-        let scale = if domain.dimension == 2 { share.sqrt() } else { cube_root(share) };
-        let drop = settings.root_pressure.pascals() - settings.terminal_pressure.pascals();
+        let scale = domain.millimetres(settings);
+        let VesselFlow { rate, viscosity, root_pressure, terminal_pressure } = settings.flow[kind];
+        let drop = root_pressure.pascals() - terminal_pressure.pascals();
         // Flow in mm³/s.
-        let flow = settings.flow.cubic_metres_per_second() * 1.0e9 / f64::from(settings.terminals);
-        let unit = 8.0 * settings.viscosity.pascal_seconds() * flow / (PI * drop * scale * scale * scale);
+        let flow = rate.cubic_metres_per_second() * 1.0e9 / f64::from(settings.terminals);
+        let unit = 8.0 * viscosity.pascal_seconds() * flow / (PI * drop * scale * scale * scale);
         Self {
             kind,
             trees: Vec::new(),
@@ -57,6 +65,8 @@ impl System {
             is_stuck: false,
             vacancy: Vacancy::new(domain, settings.terminals),
             candidates: Candidates::default(),
+            excess: None,
+            stuck: Vec::new(),
             unit,
         }
     }
@@ -75,6 +85,57 @@ impl System {
         }
     }
 
+    /// Flow of the next terminal, in that of a mean one.
+    ///
+    /// What one terminal has more, the next has less, so all of them have the flow that was asked for.
+    fn share(&mut self, settings: &CcoSettings, rng: &mut VesselRng) -> f64 {
+        if settings.flow_spread == 0.0 {
+            return 1.0;
+        }
+        let excess = match self.excess {
+            Some(excess) => excess,
+            None if self.terminals % 2 == 1 => 0.0,
+            // The last one of an odd number has nobody to make up for it.
+            None if self.terminals + 1 == settings.terminals => 0.0,
+            None => f64::from(settings.flow_spread) * (2.0 * rng.random::<f64>() - 1.0),
+        };
+        self.excess = Some(excess);
+        1.0 + (excess / FLOW_UNIT).round() * FLOW_UNIT
+    }
+
+    /// Counts a terminal at a place, whose flow was [`share`](Self::share).
+    fn count(&mut self, domain: &Domain, place: DVec3) {
+        self.vacancy.take(domain, place);
+        self.count_flow();
+    }
+
+    fn count_flow(&mut self) {
+        self.terminals += 1;
+        self.excess = self.excess.filter(|_| self.terminals % 2 == 1).map(|excess| -excess);
+    }
+
+    /// Takes over a tree from which growth continues.
+    pub(super) fn adopt(
+        &mut self,
+        space: &mut Space,
+        given: &VesselTree,
+        settings: &CcoSettings,
+        rng: &mut VesselRng,
+    ) -> Result<(), CcoError> {
+        let tips = given.tips().len() as u32;
+        let unit = self.unit_at(&space.domain, tips, settings);
+        let kind = self.kind;
+        let (trees, terminals) = space.adopt(kind, given, unit, || {
+            let share = self.share(settings, rng);
+            self.count_flow();
+            share
+        })?;
+        self.trees.extend(trees);
+        let places: Vec<DVec3> = terminals.into_iter().map(|node| space.forest.place(node)).collect();
+        self.vacancy.start_with(&space.domain, &places);
+        Ok(())
+    }
+
     /// Grows the first vessel of a root, to the deepest of some places to which one fits.
     pub(super) fn plant(
         &mut self,
@@ -84,6 +145,7 @@ impl System {
         rng: &mut VesselRng,
     ) -> Result<(), CcoError> {
         let unit = self.unit_at(&space.domain, self.terminals + 1, settings);
+        space.share = self.share(settings, rng);
         let root = root.as_dvec3();
         let mut places: Vec<(f64, DVec3)> = Vec::with_capacity(FIRST_PLACES);
         for _ in 0..FIRST_PLACES {
@@ -98,8 +160,7 @@ impl System {
             radius = space.radius(segment);
             if space.is_long_enough(segment, f64::INFINITY) && space.has_room(&[segment]) {
                 self.trees.push(space.forest.node(segment).tree);
-                self.vacancy.take(&space.domain, place);
-                self.terminals += 1;
+                self.count(&space.domain, place);
                 self.set_unit(space, unit);
                 return Ok(());
             }
@@ -122,21 +183,31 @@ impl System {
         let (old, unit) =
             (space.unit[self.trees[0] as usize], self.unit_at(&space.domain, self.terminals + 1, settings));
         self.set_unit(space, unit);
+        space.share = self.share(settings, rng);
+        space.blocked = None;
         space.index.coarsen(self.vacancy.threshold());
         let share = f64::from(self.terminals) / f64::from(settings.terminals);
         space.reserve = 1.0 + RESERVE * (1.0 - share);
         if self.join(space, place, settings) {
-            self.vacancy.take(&space.domain, place);
-            self.terminals += 1;
+            self.count(&space.domain, place);
             self.refused = 0;
             return true;
         }
         self.set_unit(space, old);
+        self.relieve(space);
         self.vacancy.refuse();
         self.rejected += 1;
         self.refused += 1;
         self.is_stuck = self.refused >= MOST_REFUSED;
         false
+    }
+
+    /// Makes room around the segment that was in the way of the last terminal, unless that was in vain before.
+    fn relieve(&mut self, space: &mut Space) {
+        let Some(segment) = space.blocked.filter(|segment| !self.stuck.contains(segment)) else { return };
+        if !space.relieve(segment) {
+            self.stuck.push(segment);
+        }
     }
 
     fn join(&mut self, space: &mut Space, place: DVec3, settings: &CcoSettings) -> bool {

@@ -19,7 +19,7 @@ use rand::RngExt;
 use std::sync::Arc;
 
 fn space(tissue: Arc<dyn Tissue>, gamma: f64, unit: f64) -> Space {
-    let domain = Domain::new(tissue, 0.0).expect("a domain");
+    let domain = Domain::new(tissue).expect("a domain");
     let mut space = Space::new(domain, Forest::new(Exponent::new(gamma)));
     space.begin();
     let [_, segment] = space.plant(DVec3::Y * 0.5, DVec3::ZERO, unit);

@@ -5,6 +5,9 @@
 //! draws are in vain. Here they come from cells without a terminal. A cell's diagonal is the threshold, so one with a
 //! terminal has no room for another, and one that is fully covered is dropped. The threshold only ever falls, by the
 //! same factor.
+//!
+//! Where the tissue's density ρ is below 1, terminals keep more distance: ρ^(−1/d) times the threshold in d dimensions,
+//! so that their number is in proportion to ρ.
 
 use super::{cell_map::CellMap, domain::Domain};
 use crate::synthesis::random::VesselRng;
@@ -15,8 +18,12 @@ use rand::RngExt;
 const FALL: f64 = 0.9;
 /// Draws in vain in a row after which the threshold falls.
 const TRIES: u32 = 100;
-/// Neighbours of a cell along an axis that the threshold reaches, the nearest first.
-const OFFSETS: [i64; 5] = [0, 1, -1, 2, -2];
+/// Neighbours of a cell along an axis, the nearest first, as far as terminals keep apart.
+const OFFSETS: [i64; 19] = [0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8, -8, 9, -9];
+/// Largest distance between terminals, in thresholds: places with less density than belongs to it have no terminals.
+const MOST_APART: f64 = 5.0;
+/// Cells along the longest side of the tissue in which the mean density is measured.
+const MEAN_CELLS: f64 = 24.0;
 /// The threshold falls no lower than this share of a terminal's own size, far below what terminals need that are drawn
 /// at random: there is no room if none is found by then.
 const LEAST_SHARE: f64 = 0.3;
@@ -36,6 +43,8 @@ pub(super) struct Vacancy {
     terminals: Vec<Vec3>,
     /// Places in vain in a row.
     failed: u32,
+    /// Whether terminals are equally dense everywhere.
+    is_uniform: bool,
 }
 
 impl Vacancy {
@@ -51,10 +60,22 @@ impl Vacancy {
             taken: CellMap::default(),
             terminals: Vec::new(),
             failed: 0,
+            is_uniform: domain.is_uniform(),
         };
+        if !vacancy.is_uniform {
+            let scale = size_of_share(domain, vacancy.mean_density(domain).recip()) / size_of_share(domain, 1.0);
+            vacancy.least *= scale;
+        }
         vacancy.terminals.reserve_exact(terminals as usize);
         vacancy.rebuild(domain);
         vacancy
+    }
+
+    /// Takes the places of terminals that are there before all others.
+    pub(super) fn start_with(&mut self, domain: &Domain, places: &[DVec3]) {
+        self.terminals.extend(places.iter().map(|place| place.as_vec3()));
+        self.threshold = size_of_share(domain, places.len() as f64).min(self.threshold);
+        self.rebuild(domain);
     }
 
     /// Sets the size of cells for the present threshold.
@@ -79,10 +100,38 @@ impl Vacancy {
         for cell in 0..self.cells() as u32 {
             let number = u64::from(cell);
             let center = self.at(domain, number, DVec3::splat(0.5));
-            if self.taken.get(number).is_none() && domain.may_be_within(center, 0.5 * self.threshold) {
+            let is_free = self.taken.get(number).is_none() && domain.may_be_within(center, 0.5 * self.threshold);
+            if is_free && (self.is_uniform || self.may_hold(domain, number, center)) {
                 self.vacant.push(cell);
             }
         }
+    }
+
+    /// The mean density of terminals in the domain, at the centres of cells.
+    fn mean_density(&mut self, domain: &Domain) -> f64 {
+        let threshold = std::mem::replace(&mut self.threshold, domain.sides.max_element() / MEAN_CELLS);
+        self.divide(domain);
+        let centers = (0..self.cells()).map(|cell| self.at(domain, cell, DVec3::splat(0.5)));
+        let densities = centers.filter(|&center| domain.may_be_within(center, 0.0)).map(|at| domain.density(at));
+        let (sum, count) = densities.fold((0.0, 0u32), |(sum, count), density| (sum + density, count + 1));
+        self.threshold = threshold;
+        (sum / f64::from(count.max(1))).max(1.0e-6)
+    }
+
+    /// Distance that a terminal at a point keeps from others; `None` where there are none.
+    fn reach(&self, domain: &Domain, point: DVec3) -> Option<f64> {
+        if self.is_uniform {
+            return Some(self.threshold);
+        }
+        let density = domain.density(point);
+        let apart = if density > 0.0 { size_of(domain, density.recip()) } else { f64::INFINITY };
+        (apart <= MOST_APART).then_some(apart * self.threshold)
+    }
+
+    /// Whether terminals have a density above 0 at the centre or a corner of a cell.
+    fn may_hold(&self, domain: &Domain, cell: u64, center: DVec3) -> bool {
+        let may = |point| self.reach(domain, point).is_some();
+        may(center) || corners(domain).any(|corner| may(self.at(domain, cell, corner)))
     }
 
     /// A point of a cell, from 0 to 1 along each axis.
@@ -121,15 +170,16 @@ impl Vacancy {
                 let within = DVec3::new(rng.random(), rng.random(), rng.random());
                 // Rounded, as it will be kept.
                 let point = self.at(domain, cell, within).as_vec3().as_dvec3();
-                match self.nearest(domain, point) {
-                    Some(nearest) => {
+                let nearest = self.reach(domain, point).map(|reach| self.nearest(domain, point, reach));
+                match nearest {
+                    Some(Some(nearest)) => {
                         if self.covers(domain, nearest, cell) {
                             self.vacant.swap_remove(slot);
                         }
                         self.failed += 1;
                     }
-                    None if domain.holds_point(point, radius) => return Some(point),
-                    None => self.failed += 1,
+                    Some(None) if domain.holds_point(point, radius) => return Some(point),
+                    _ => self.failed += 1,
                 }
             }
             self.threshold *= FALL;
@@ -143,15 +193,18 @@ impl Vacancy {
         }
     }
 
-    /// A terminal nearer to a point than the threshold.
-    fn nearest(&self, domain: &Domain, point: DVec3) -> Option<DVec3> {
+    /// A terminal nearer to a point than `reach`.
+    fn nearest(&self, domain: &Domain, point: DVec3, reach: f64) -> Option<DVec3> {
         let center = self.coordinates(domain, point);
-        let square = self.threshold * self.threshold;
+        let square = reach * reach;
         let last = self.size.map(|count| count as i64 - 1);
+        let cells = (reach / self.side).ceil() as usize;
         // A cell's own terminal first, which is near in most cases.
-        for dz in OFFSETS {
-            for dy in OFFSETS {
-                for dx in OFFSETS {
+        let offsets = &OFFSETS[..OFFSETS.len().min(2 * cells + 1)];
+        let layers = if domain.dimension == 2 { &OFFSETS[..1] } else { offsets };
+        for &dz in layers {
+            for &dy in offsets {
+                for &dx in offsets {
                     let cell = [center[0] + dx, center[1] + dy, center[2] + dz];
                     if (0..3).any(|axis| cell[axis] < 0 || cell[axis] > last[axis]) {
                         continue;
@@ -169,10 +222,9 @@ impl Vacancy {
 
     /// Whether a terminal leaves no room in a cell.
     fn covers(&self, domain: &Domain, terminal: DVec3, cell: u64) -> bool {
-        let corner = |bit: usize, axis: usize| f64::from((bit >> axis & 1) as u32);
-        (0..1 << domain.dimension).all(|bit: usize| {
-            let at = self.at(domain, cell, DVec3::new(corner(bit, 0), corner(bit, 1), corner(bit, 2)));
-            at.distance_squared(terminal) < self.threshold * self.threshold
+        corners(domain).all(|corner| {
+            let at = self.at(domain, cell, corner);
+            self.reach(domain, at).is_none_or(|reach| at.distance_squared(terminal) < reach * reach)
         })
     }
 
@@ -200,8 +252,18 @@ impl Vacancy {
     }
 }
 
+/// The corners of a cell, from 0 to 1 along each axis.
+fn corners(domain: &Domain) -> impl Iterator<Item = DVec3> {
+    let corner = |bit: usize, axis: usize| f64::from((bit >> axis & 1) as u32);
+    (0..1 << domain.dimension).map(move |bit: usize| DVec3::new(corner(bit, 0), corner(bit, 1), corner(bit, 2)))
+}
+
 /// Side of the square or cube that is a share of the domain: `δ_max` of Eq. 15.
 fn size_of_share(domain: &Domain, shares: f64) -> f64 {
-    let measure = domain.measure / shares;
+    size_of(domain, domain.measure / shares)
+}
+
+/// Side of a square or a cube of this area or volume.
+fn size_of(domain: &Domain, measure: f64) -> f64 {
     if domain.dimension == 2 { measure.sqrt() } else { super::power::cube_root(measure) }
 }

@@ -189,6 +189,22 @@ impl Tissue for DensityTissue {
         self.tissue.walk(from, direction, length, tolerance, arrive);
     }
 
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        self.tissue.depth(point)
+    }
+
+    fn depth_is_searched(&self) -> bool {
+        self.tissue.depth_is_searched()
+    }
+
+    fn density(&self, point: Vec3) -> f32 {
+        self.field.at(point) * self.tissue.density(point)
+    }
+
+    fn is_uniform(&self) -> bool {
+        false
+    }
+
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         let point = self.tissue.sample(rng)?;
         (rng.random::<f32>() < self.field.at(point)).then_some(point)

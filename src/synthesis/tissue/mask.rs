@@ -8,10 +8,12 @@ use crate::synthesis::{
     tissue::{
         Extent, Tissue, TissuePoint,
         error::{TissueError, finite_point, positive},
+        mask_border::MaskBorder,
     },
 };
 use bevy_math::{UVec2, UVec3, Vec2, Vec3, Vec3A, bounding::Aabb3d};
 use rand::RngExt;
+use std::sync::OnceLock;
 
 /// Distance within which a point counts as part of a cell, as a share of the cell's longest side.
 const TOLERANCE: f32 = 1.0e-4;
@@ -34,6 +36,8 @@ pub struct Mask {
     runs: Vec<Bounds>,
     index: BoxTree,
     bounds: Bounds,
+    /// Made when the first depth is asked for, since only some generators need it.
+    border: OnceLock<MaskBorder>,
 }
 
 impl Mask {
@@ -152,6 +156,7 @@ impl Mask {
             runs: Vec::new(),
             index: BoxTree::default(),
             bounds: Bounds::EMPTY,
+            border: OnceLock::new(),
         };
         if mask.set.is_empty() {
             return Err(TissueError::EmptyMask);
@@ -261,6 +266,22 @@ impl Tissue for Mask {
         let position =
             if inside || !point.is_finite() { point } else { self.nearest(point, f32::INFINITY).unwrap_or(point) };
         TissuePoint::new(position, if self.flat { Vec3::Z } else { Vec3::ZERO })
+    }
+
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        let border = self.border.get_or_init(|| {
+            let axes = if self.flat { 2 } else { 3 };
+            let (is_set, corner) = (|cell| self.cells.contains(cell), |cell, within| self.corner(cell, within));
+            MaskBorder::new(self.size, axes, &self.set, is_set, corner)
+        });
+        let point = if self.flat { point.with_z(self.origin.z) } else { point };
+        let distance = border.distance(point);
+        let is_inside = self.cell(point).is_some_and(|cell| self.cells.contains(cell));
+        Some(if is_inside { distance } else { -distance })
+    }
+
+    fn depth_is_searched(&self) -> bool {
+        true
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {

@@ -22,6 +22,7 @@ pub mod density;
 mod error;
 pub mod growth;
 pub mod mask;
+mod mask_border;
 pub mod no_go;
 pub mod paint;
 pub mod path;
@@ -165,6 +166,17 @@ pub trait Tissue: Debug + Send + Sync {
     /// `None` if this draw failed: it fell beside the tissue, its density field rejected it, or the tissue has no size.
     /// The caller still counts it as a sample.
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3>;
+
+    /// Relative density of attraction points or terminals at a point, from 0 to 1: the probability with which
+    /// [`sample`](Self::sample) keeps it.
+    fn density(&self, _point: Vec3) -> f32 {
+        1.0
+    }
+
+    /// Whether [`density`](Self::density) is 1 everywhere.
+    fn is_uniform(&self) -> bool {
+        true
+    }
 
     /// Appends `count` candidates, less those that failed, as by `count` calls of [`sample`](Self::sample). A tissue
     /// may have a faster way to draw many.

@@ -84,6 +84,14 @@ impl Tissue for NoGoTissue {
         self.allowed(point)
     }
 
+    fn density(&self, point: Vec3) -> f32 {
+        self.tissue.density(point)
+    }
+
+    fn is_uniform(&self) -> bool {
+        self.tissue.is_uniform()
+    }
+
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
         let first = candidates.len();
         let mut kept = first;

@@ -1,0 +1,51 @@
+//! Makes room around a vessel that is in the way of all those below it.
+//!
+//! A trunk becomes wider with each terminal below it. Once it touches a neighbour or the border, none of its subtree can
+//! grow on. Then its ends move a little to where there is room, and where that costs least volume.
+
+use super::{forest::NONE, space::Space};
+use bevy_math::DVec3;
+
+/// How far a bifurcation moves, in radii of the vessel, tried in turn.
+const WAYS: [f64; 3] = [0.2, 0.5, 1.0];
+/// Room for growth that the vessel must have afterwards, as a factor of its radius.
+const ROOM: f64 = 1.1;
+
+impl Space {
+    /// Moves an end of a segment so that it gets room to grow. Returns whether that was possible.
+    pub(super) fn relieve(&mut self, segment: u32) -> bool {
+        let parent = self.forest.node(segment).parent;
+        let step = self.radius(segment);
+        WAYS.into_iter().any(|way| [segment, parent].into_iter().any(|node| self.evade(node, way * step)))
+    }
+
+    /// Moves a bifurcation by this way, in the direction of least volume of those in which there is room.
+    fn evade(&mut self, node: u32, way: f64) -> bool {
+        let own = *self.forest.node(node);
+        if own.parent == NONE || own.children[1] == NONE || node < self.given {
+            return false;
+        }
+        let (reserve, mut best) = (std::mem::replace(&mut self.reserve, ROOM), None);
+        for place in self.directions().map(|direction| (own.at.as_dvec3() + direction * way).as_vec3().as_dvec3()) {
+            if self.try_shift(node, place) {
+                let volume = self.forest.node(self.root_segment(own.tree)).sums.volume;
+                if best.is_none_or(|(least, _)| volume < least) {
+                    best = Some((volume, place));
+                }
+                self.undo();
+            }
+        }
+        let moves = best.is_some_and(|(_, place)| self.try_shift(node, place));
+        self.reserve = reserve;
+        moves
+    }
+
+    /// Directions that differ by 45° or less from any direction in the domain.
+    fn directions(&self) -> impl Iterator<Item = DVec3> + use<> {
+        let (axes, layers) = (self.domain.axes, if self.domain.dimension == 2 { 0..=0 } else { -1..=1 });
+        layers
+            .flat_map(|z| (-1..=1).flat_map(move |y| (-1..=1).map(move |x| [x, y, z].map(f64::from))))
+            .filter(|&[x, y, z]| x != 0.0 || y != 0.0 || z != 0.0)
+            .map(move |[x, y, z]| (axes[0] * x + axes[1] * y + axes[2] * z).normalize())
+    }
+}
