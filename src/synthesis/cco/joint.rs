@@ -21,6 +21,8 @@ const NEAR_END: f64 = 0.15;
 const AT_END: f64 = 2.0e-3;
 /// Steps at an end after which the search is over.
 const STEPS_AT_END: usize = 10;
+/// Share of the pull of an end that leaves no doubt: pulls change with lengths, so there may be a better place beside it.
+const CLEARLY: f64 = 0.95;
 /// Halvings of a step that does not lower the volume.
 const HALVINGS: usize = 12;
 /// Least length of a segment, as a share of the joint's size: a pull has no direction at its end.
@@ -122,14 +124,14 @@ impl Joint {
         place
     }
 
-    /// Whether the joint would stay at an end: the others pull no more than that end does.
+    /// Whether the joint would stay at an end: the others pull clearly less than that end does.
     fn rests_at(&self, end: usize, slope: &Slope) -> bool {
         let place = self.ends[end];
         let sums = self.sums(place);
         let pulls = self.pulls(&sums, slope);
         let others = (0..3).filter(|&other| other != end);
         let pull: DVec3 = others.map(|other| (self.ends[other] - place) * (pulls[other] / sums.lengths[other])).sum();
-        pull.length_squared() <= pulls[end] * pulls[end]
+        pull.length() <= CLEARLY * pulls[end]
     }
 
     /// What the first step of a search would gain.
