@@ -50,6 +50,7 @@ pub use settings::{CcoSettings, VesselFlow};
 
 use crate::synthesis::{
     growth::StepCount,
+    parallel,
     random::{Stream, VesselRng},
     roots::Roots,
     tissue::{Tissue, TissuePoint},
@@ -240,9 +241,11 @@ impl Cco {
     /// # Errors
     /// [`CcoError::NoRoom`] if there was no room for all terminals. The trees with those that were placed stay.
     pub fn run(&mut self) -> Result<(), CcoError> {
-        while !self.is_finished() {
-            self.advance();
-        }
+        parallel::with_company(|| {
+            while !self.is_finished() {
+                self.advance();
+            }
+        });
         self.settle();
         self.outcome()
     }
