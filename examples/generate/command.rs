@@ -168,6 +168,14 @@ pub enum Format {
     Obj,
     /// A table of segments.
     Csv,
+    /// Diameters by level, in mm if the method has a physical size.
+    Levels,
+    /// A graph as OpenCCO writes it, a file for each kind of vessels.
+    Gxl,
+    /// A picture of lines, for web pages.
+    Svg,
+    /// The same for papers.
+    Eps,
     /// Closed meshes, as binary glTF.
     Glb,
     /// Closed meshes, as binary STL.

@@ -44,7 +44,7 @@ impl Format {
             Self::Off => Some(".off"),
             // The other OBJ file has the plain name.
             Self::ObjMesh => Some("_mesh.obj"),
-            Self::Swc | Self::Obj | Self::Csv => None,
+            Self::Swc | Self::Obj | Self::Csv | Self::Levels | Self::Gxl | Self::Svg | Self::Eps => None,
         }
     }
 }

@@ -4,10 +4,14 @@ use super::mesh::{Meshed, meshes, save};
 use super::report::{CcoFigures, KindMeasures, Line};
 use super::{Failure, Format, Job};
 use bevy_vessels::synthesis::{
-    cco::Cco,
+    cco::{Cco, VesselFlow},
     growth::{Growth, StepCount},
-    io::{ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc, swc_structure},
+    io::{
+        GxlOptions, ObjOptions, SwcOptions, WriteError, save_csv, save_eps, save_gxl, save_levels, save_obj, save_svg,
+        save_swc, swc_structure,
+    },
     roots::Roots,
+    tissue::Extent,
     tree::{ByKind, VesselKind, VesselTree, hash_trees},
 };
 use std::any::Any;
@@ -82,6 +86,7 @@ fn write_files(
         .iter()
         .filter_map(|(kind, tree)| Some((kind, tree.as_ref().filter(|tree| !tree.is_empty())?)))
         .collect();
+    let millimetres = (growth as &dyn Any).downcast_ref::<Cco>().map_or(1.0, Cco::millimetres);
     let stem = format!("{}_{}_{seed}", file_name(&tissue_stem(job)), file_name(&job.preset_name));
     let mut files = Vec::new();
     let mut write = |name: String, write: &dyn Fn(&Path) -> Result<(), WriteError>| {
@@ -100,6 +105,21 @@ fn write_files(
             }
             Format::Obj => write(format!("{stem}.obj"), &|path| save_obj(path, &trees, &ObjOptions::default()))?,
             Format::Csv => write(format!("{stem}.csv"), &|path| save_csv(path, &trees))?,
+            Format::Levels => write(format!("{stem}_levels.csv"), &|path| save_levels(path, &trees, millimetres))?,
+            Format::Gxl => {
+                for &(kind, tree) in &trees {
+                    let name = format!("{stem}_{}", kind.name());
+                    let options = GxlOptions {
+                        name: name.clone(),
+                        flow: job.generator.cco().map_or_else(VesselFlow::default, |settings| settings.flow[kind]),
+                        millimetres,
+                        is_flat: matches!(job.tissue.extent(), Extent::Area(_)) && has_one_height(tree),
+                    };
+                    write(format!("{name}.gxl"), &|path| save_gxl(path, tree, &options))?;
+                }
+            }
+            Format::Svg => write(format!("{stem}.svg"), &|path| save_svg(path, &trees))?,
+            Format::Eps => write(format!("{stem}.eps"), &|path| save_eps(path, &trees))?,
             mesh => {
                 if let Some(ending) = mesh.mesh_ending() {
                     write(format!("{stem}{ending}"), &|path| save(path, meshes, comments(job, None, seed, hash)))?;
@@ -108,6 +128,11 @@ fn write_files(
         }
     }
     Ok(files)
+}
+
+/// Whether a tree lies in a plane z = constant.
+fn has_one_height(tree: &VesselTree) -> bool {
+    tree.positions().iter().all(|position| position.z == tree.positions()[0].z)
 }
 
 /// Header comments with all that is needed to grow a file's vessels again.

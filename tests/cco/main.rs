@@ -2,6 +2,7 @@
 //! OpenCCO gives.
 
 mod beyond;
+mod files;
 mod oracle;
 mod organs;
 mod quality;
