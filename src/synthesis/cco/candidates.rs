@@ -49,18 +49,16 @@ pub(super) struct Guess {
 
 /// What is known of a candidate.
 #[derive(Clone, Copy, Debug)]
-enum Rank {
-    Guessed(Guess),
-    Known(Candidate),
+struct Rank {
+    guess: Guess,
+    /// Its best place, once that has been searched for.
+    known: Option<Candidate>,
 }
 
 impl Rank {
     /// The least cost that it may have, and its segment, which decides between equals.
     fn key(&self) -> (f64, u32) {
-        match self {
-            Self::Guessed(guess) => (guess.bound, guess.segment),
-            Self::Known(candidate) => (candidate.cost, candidate.segment),
-        }
+        (self.known.map_or(self.guess.bound, |known| known.cost), self.guess.segment)
     }
 }
 
@@ -143,7 +141,7 @@ impl Candidates {
         }
         self.paths.clear();
         for &(_, segment) in &self.found[known..] {
-            self.ranks.push(Rank::Guessed(space.guess(segment, point, &mut self.paths)));
+            self.ranks.push(Rank { guess: space.guess(segment, point, &mut self.paths), known: None });
         }
         self.best(space, tolerance);
     }
@@ -173,12 +171,13 @@ impl Candidates {
                 let (a, b) = (self.ranks[a].key(), self.ranks[b].key());
                 a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
             })?;
-            match self.ranks[best] {
-                Rank::Known(candidate) => return Some((best, candidate)),
-                Rank::Guessed(guess) => match space.search(&guess, tolerance) {
-                    Some(candidate) => self.ranks[best] = Rank::Known(candidate),
-                    None => drop(self.ranks.swap_remove(best)),
-                },
+            let rank = &mut self.ranks[best];
+            if let Some(known) = rank.known {
+                return Some((best, known));
+            }
+            rank.known = space.search(&rank.guess, tolerance);
+            if rank.known.is_none() {
+                self.ranks.swap_remove(best);
             }
         }
     }

@@ -74,7 +74,7 @@ impl Space {
             if fits {
                 self.strain_from(segment);
             } else {
-                self.blocked = Some(segment);
+                self.blocked = Some([segment, self.in_the_way]);
             }
             fits
         });
@@ -85,6 +85,7 @@ impl Space {
     /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room for
     /// radii that are `reserve` times as wide.
     pub(super) fn clear(&mut self, segment: u32, reserve: f64) -> bool {
+        self.in_the_way = segment;
         let radius = self.radius(segment);
         let parent = self.forest.node(segment).parent;
         let ends = [self.forest.place(parent), self.forest.place(segment)];
@@ -99,7 +100,7 @@ impl Space {
         }
         let mut tightened = std::mem::take(&mut self.tightened);
         tightened.clear();
-        let mut has_room = true;
+        let (mut has_room, mut in_the_way) = (true, segment);
         let (middle, half) = (ends[0].midpoint(ends[1]), 0.5 * ends[0].distance(ends[1]));
         self.index.near(ends[0], ends[1], bound, |other| {
             let node = self.forest.node(other);
@@ -120,7 +121,7 @@ impl Space {
             let (distance, other_radius) = (square.sqrt(), self.radius(other));
             let spare = distance - APART * (radius + other_radius);
             if spare < 0.0 || distance < reserve * (radius + other_radius) {
-                has_room = false;
+                (has_room, in_the_way) = (false, other);
                 return false;
             }
             // Half of the room for each, but no bound becomes wider.
@@ -140,6 +141,7 @@ impl Space {
             }
         }
         self.tightened = tightened;
+        self.in_the_way = in_the_way;
         has_room
     }
 

@@ -1,22 +1,31 @@
 //! Makes room around a vessel that is in the way of all those below it.
 //!
 //! A trunk becomes wider with each terminal below it. Once it touches a neighbour or the border, none of its subtree can
-//! grow on. Then its ends move a little to where there is room, and where that costs least volume.
+//! grow on. Then its ends move a little to where there is room, and where that costs least volume; or those of the
+//! neighbour do.
 
 use super::{forest::NONE, space::Space};
 use bevy_math::DVec3;
 
 /// How far a bifurcation moves, in radii of the vessel, tried in turn.
-const WAYS: [f64; 3] = [0.2, 0.5, 1.0];
+const WAYS: [f64; 4] = [0.2, 0.5, 1.0, 2.0];
 /// Room for growth that the vessel must have afterwards, as a factor of its radius.
 const ROOM: f64 = 1.1;
 
 impl Space {
-    /// Moves an end of a segment so that it gets room to grow. Returns whether that was possible.
-    pub(super) fn relieve(&mut self, segment: u32) -> bool {
-        let parent = self.forest.node(segment).parent;
+    /// Moves an end of a segment, or of its neighbour, so that it gets room to grow. Returns whether that was possible.
+    pub(super) fn relieve(&mut self, [segment, neighbour]: [u32; 2]) -> bool {
+        let is_there = |node: &u32| (*node as usize) < self.forest.nodes.len();
+        if !is_there(&segment) {
+            return false;
+        }
+        let mut ends: Vec<u32> = Vec::with_capacity(4);
+        for node in [segment, neighbour].into_iter().filter(is_there) {
+            ends.extend([node, self.forest.node(node).parent].into_iter().filter(|end| *end != NONE));
+        }
+        ends.dedup();
         let step = self.radius(segment);
-        WAYS.into_iter().any(|way| [segment, parent].into_iter().any(|node| self.evade(node, way * step)))
+        WAYS.into_iter().any(|way| ends.iter().any(|&node| self.evade(node, way * step)))
     }
 
     /// Moves a bifurcation by this way, in the direction of least volume of those in which there is room.

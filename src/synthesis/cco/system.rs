@@ -28,6 +28,8 @@ const FLOW_UNIT: f64 = 1.0 / 1_048_576.0;
 /// Places refused in a row after which a kind has no room for more.
 const MOST_REFUSED: u32 = 500;
 
+/// Refused terminals after which a segment that no move gave room is looked at again.
+const PATIENCE: u64 = 40;
 /// Terminals from which on several are ranked at a time: the trees then hardly change meanwhile.
 const FIRST_BATCH: u32 = 256;
 /// Terminals that are ranked at a time.
@@ -63,8 +65,8 @@ pub(super) struct System {
     planned: usize,
     /// Excess of the next terminal's flow over the mean, if that is decided, in units.
     excess: Option<f64>,
-    /// Segments that no move gives room.
-    stuck: Vec<u32>,
+    /// Segments that no move gave room, and the number of refused terminals then.
+    stuck: Vec<(u32, u64)>,
     /// 8µQ/(πk·ΔP·s³): the unit of a radius's fourth power once the domain has its full size.
     unit: f64,
 }
@@ -254,11 +256,14 @@ impl System {
         self.planned > 0
     }
 
-    /// Makes room around the segment that was in the way of the last terminal, unless that was in vain before.
+    /// Makes room around the segment that was in the way of the last terminal, unless that was in vain lately.
     fn relieve(&mut self, space: &mut Space) {
-        let Some(segment) = space.blocked.filter(|segment| !self.stuck.contains(segment)) else { return };
-        if !space.relieve(segment) {
-            self.stuck.push(segment);
+        let Some(blocked) = space.blocked else { return };
+        let rejected = self.rejected;
+        self.stuck.retain(|&(_, then)| rejected < then + PATIENCE);
+        let is_in_vain = self.stuck.iter().any(|&(segment, _)| segment == blocked[0]);
+        if !is_in_vain && !space.relieve(blocked) {
+            self.stuck.push((blocked[0], rejected));
         }
     }
 
