@@ -2,6 +2,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod loops;
 mod measures;
 mod networks;
 mod real;

@@ -2,10 +2,11 @@
 
 use bevy_math::{DVec3, Vec3};
 use bevy_vessels::synthesis::{
-    segment_index::{SegmentIndex, start_radius},
-    surface::{Surface, SurfaceMesh, SurfaceSettings},
-    tree::{NO_PARENT, VesselTree},
+    segment_index::{SegmentIndex, overlaps, start_radius},
+    surface::{ClosingVessel, Surface, SurfaceMesh, SurfaceSettings},
+    tree::{NO_PARENT, NodeId, VesselTree},
 };
+use std::{fs, path::Path};
 
 /// The surface of a tree, which must be closed, oriented and finite, a ball for each root, without a face of no area.
 pub fn sound_surface(name: &str, tree: &VesselTree, settings: &SurfaceSettings) -> Surface {
@@ -100,4 +101,41 @@ pub fn union_volume(tree: &VesselTree, points: usize) -> f64 {
 pub fn widened(tree: &VesselTree, factor: f32) -> VesselTree {
     let radii = tree.radii().iter().map(|radius| radius * factor).collect();
     VesselTree::from_arrays(tree.positions().to_vec(), tree.parents().to_vec(), radii).expect("a tree")
+}
+
+/// The vessels that close a network's loops, from pairs of ids in a file beside its SWC, whose ids count from 1.
+pub fn loops_of(path: &Path, tree: &VesselTree) -> Vec<ClosingVessel> {
+    let text = fs::read_to_string(path).expect("pairs of ids");
+    let pair = |line: &str| {
+        let ids = line.split(',').map(|id| NodeId(id.trim().parse::<u32>().expect("an id") - 1));
+        let [a, b] = ids.collect::<Vec<_>>()[..] else { panic!("no pair: {line}") };
+        ClosingVessel::between(tree, a, b)
+    };
+    text.lines().skip(1).map(pair).collect()
+}
+
+/// How many triangles of a surface meet others, and how many of these are not near segments that run through each other.
+pub fn meeting(tree: &VesselTree, mesh: &SurfaceMesh) -> [usize; 2] {
+    let check = mesh.validate();
+    if check.intersections.is_empty() {
+        return [0; 2];
+    }
+    let mut is_near = vec![false; tree.len()];
+    for NodeId(node) in overlaps(tree, &SegmentIndex::new(tree)).into_iter().flatten() {
+        is_near[node as usize] = true;
+    }
+    // Their ends reach over the next two segments.
+    for _ in 0..2 {
+        let before = is_near.clone();
+        for (node, parent) in tree.segments() {
+            is_near[node] |= before[parent];
+            is_near[parent] |= before[node];
+        }
+    }
+    let mut triangles: Vec<u32> = check.intersections.into_iter().flatten().collect();
+    triangles.sort_unstable();
+    triangles.dedup();
+    let corners: Vec<[u32; 3]> = mesh.closed_triangles().collect();
+    let node = |triangle: &u32| mesh.nodes[corners[*triangle as usize][0] as usize];
+    [triangles.len(), triangles.iter().filter(|triangle| !is_near[node(triangle) as usize]).count()]
 }

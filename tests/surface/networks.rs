@@ -1,9 +1,11 @@
 //! A thousand grown networks: all tissues, all presets of space colonization, many seeds, three widths.
 
 use crate::common::tissues;
-use crate::measures::{sound_surface, union_volume, volume, widened};
+use crate::measures::{meeting, sound_surface, union_volume, volume, widened};
+use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::{Colonization, ColonizationSettings},
+    mesh::{TriangleIndex, TriangleMesh},
     preset::{Preset, PresetName},
     surface::{Surface, SurfaceSettings},
     tree::{VesselKind, VesselTree},
@@ -47,26 +49,25 @@ fn a_thousand_networks_have_closed_surfaces() {
     });
 }
 
-/// The published share of bifurcations without a defect is 83 % at best. Here, of nodes, it is above 99.9 %.
+/// The published share of bifurcations without a defect is 83 % at best. Here none has one at the presets' radii, but for
+/// vessels that run through each other; at radii so wide that joints lack room, hardly any.
 #[test]
-fn hardly_a_face_of_a_grown_network_meets_another() {
-    let (mut faces, mut meeting, mut sound, mut remade, mut left) = (0, 0, 0, 0, 0);
-    for seed in 0..70 {
-        for tree in grow(seed) {
-            let Surface { mesh, report } = sound_surface(&format!("seed {seed}"), &tree, &SurfaceSettings::default());
-            let check = mesh.validate();
-            faces += mesh.triangle_count();
-            meeting += check.intersecting_triangles();
-            sound += u32::from(check.is_sound());
-            remade += report.remade.len();
-            left += report.left.len();
+fn faces_of_grown_networks_do_not_meet() {
+    let trees: Vec<VesselTree> = (0..70).flat_map(grow).collect();
+    for (factor, most) in [(1.0, 0), (4.0, 5), (8.0, 50)] {
+        let (mut faces, mut own, mut all, mut remade, mut left) = (0, 0, 0, 0, 0);
+        for tree in &trees {
+            let tree = widened(tree, factor);
+            let Surface { mesh, report } = Surface::new(&tree, &SurfaceSettings::default()).expect("a surface");
+            let [meeting, its] = meeting(&tree, &mesh);
+            (all, own, faces) = (all + meeting, own + its, faces + mesh.triangle_count());
+            (remade, left) = (remade + report.remade.len(), left + report.left.len());
         }
+        println!(
+            "radii × {factor}: of {faces} triangles {all} meet others, {own} of them where no segments run through each other; {remade} joints made again, {left} left"
+        );
+        assert!(own * 100_000 <= most * faces, "× {factor}: {own} of {faces}");
     }
-    println!(
-        "{meeting} of {faces} triangles meet others; {sound} of 140 networks are sound; {remade} joints made again, {left} left"
-    );
-    assert!((meeting as f64) < 3e-4 * faces as f64, "{meeting} of {faces}");
-    assert!(sound >= 130 && remade > 5 && left < 16, "{sound} are sound, {remade} joints made again, {left} left");
 }
 
 #[test]
@@ -76,6 +77,65 @@ fn volumes_of_grown_networks_are_those_of_their_round_cones() {
             let mesh = Surface::new(&tree, &SurfaceSettings::default()).expect("a surface").mesh;
             let ratio = volume(&mesh) / union_volume(&tree, 100_000);
             assert!((ratio - 1.0).abs() < 0.05, "seed {seed}, {} nodes: {ratio}", tree.len());
+        }
+    }
+}
+
+/// Widths across the vessels, from wall to wall: away from joints, tips and other vessels, 98 of 100 are within 3 %.
+#[test]
+fn vessels_are_as_wide_as_their_radii() {
+    let settings = SurfaceSettings { most_sides: 16, least_sides: 16, ..SurfaceSettings::default() };
+    // A polygon with the area of a circle has corners outside of it.
+    let chord = std::f32::consts::TAU / 32.0;
+    let corner = (chord / chord.sin()).sqrt();
+    for seed in [0, 5, 8, 16, 23, 40] {
+        let [tree, _] = grow(seed);
+        let mesh = Surface::new(&tree, &settings).expect("a surface").mesh;
+        let triangles: Vec<[u32; 3]> = mesh.closed_triangles().collect();
+        let walls = TriangleMesh::new(mesh.positions.clone(), triangles, None).expect("a mesh");
+        let walls = TriangleIndex::new(&walls);
+        let mut children = vec![0; tree.len()];
+        tree.segments().for_each(|(_, parent)| children[parent] += 1);
+        let widest_at = |node: usize| {
+            let parent = tree.parents()[node] as usize;
+            tree.radii()[node].max(tree.radii().get(parent).copied().unwrap_or(0.0))
+        };
+        let others: Vec<usize> = (0..tree.len()).filter(|&node| children[node] != 1).collect();
+        let is_away =
+            |point: Vec3| others.iter().all(|&node| tree.positions()[node].distance(point) > 4.0 * widest_at(node));
+        let mut widths: Vec<f32> = (0..mesh.unique())
+            .step_by(7)
+            .filter(|&vertex| is_away(mesh.positions[vertex]))
+            .filter_map(|vertex| {
+                let (point, normal, radius) = (mesh.positions[vertex], mesh.normals[vertex], mesh.radii[vertex]);
+                let wall = walls.first_hit(point - normal * (0.2 * radius), point - normal * (4.0 * radius))?;
+                Some(wall.position.distance(point) / (2.0 * corner * radius))
+            })
+            .collect();
+        widths.sort_by(f32::total_cmp);
+        let (count, off) = (widths.len(), widths.iter().filter(|width| (**width - 1.0).abs() > 0.03).count());
+        println!("seed {seed}: {count} widths, median {}, {off} off by more than 3 %", widths[count / 2]);
+        assert!(count > 1000 && (widths[count / 2] - 1.0).abs() < 0.01, "seed {seed}: {}", widths[count / 2]);
+        assert!(off * 50 < count, "seed {seed}: {off} of {count} widths are off by more than 3 %");
+    }
+}
+
+/// An organ is 0.2 m, 1 or 200 mm long, wherever it lies.
+#[test]
+fn the_unit_and_the_place_of_an_organ_change_nothing() {
+    let [tree, _] = grow(5);
+    let settings = SurfaceSettings::default();
+    let one = Surface::new(&tree, &settings).expect("a surface");
+    // Powers of two scale without rounding; others move the nodes by some of their last digits.
+    for (scale, tolerance) in [(0.125, 0.0), (256.0, 0.0), (0.2, 0.05), (200.0, 0.05)] {
+        let positions = tree.positions().iter().map(|position| *position * scale).collect();
+        let radii = tree.radii().iter().map(|radius| radius * scale).collect();
+        let scaled = VesselTree::from_arrays(positions, tree.parents().to_vec(), radii).expect("a tree");
+        let other = Surface::new(&scaled, &settings).expect("a surface");
+        assert_eq!((&other.report, &other.mesh.faces), (&one.report, &one.mesh.faces), "× {scale}");
+        for ((a, b), radius) in one.mesh.positions.iter().zip(&other.mesh.positions).zip(&one.mesh.radii) {
+            let off = (*a * scale).distance(*b) / scale;
+            assert!(off <= tolerance * radius, "× {scale}: {a} became {b}");
         }
     }
 }

@@ -287,23 +287,70 @@ fn settings_out_of_their_limits_are_refused() {
     assert!(message.contains("128") && message.contains("set 4, 8, 16, 32 or 64"), "{message}");
 }
 
-/// A twig that leaves a trunk at 10° stays within it for long, and beside it for longer.
+/// A twig that leaves a trunk at a flat angle stays within it for long: it opens where it parts from it.
 #[test]
-fn a_flat_lateral_is_made_from_the_outline_of_both() {
-    let aside = |length: f32| Vec3::new(0.17 * length, 0.0, 1.0 + length);
-    let nodes = [
+fn flat_laterals_open_where_they_part_from_their_trunk() {
+    for degrees in [1.0f32, 2.0, 4.0, 7.0, 10.0, 15.0, 20.0, 30.0] {
+        for length in [1.0, 6.0] {
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            let tree = tree(&[
+                (Vec3::ZERO, NO_PARENT, 0.1),
+                (Vec3::Z, 0, 0.1),
+                (Vec3::Z * 8.0, 1, 0.1),
+                (Vec3::Z + Vec3::new(sine, 0.0, cosine) * length, 1, 0.04),
+            ]);
+            for level in 1..=2 {
+                let name = format!("{degrees}°, length {length}, level {level}");
+                let settings = SurfaceSettings { level, ..SurfaceSettings::default() };
+                let surface = sound_surface(&name, &tree, &settings);
+                let check = surface.mesh.validate();
+                assert!(check.is_sound(), "{name}: {:?}", surface.report);
+                let ratio = volume(&surface.mesh) / union_volume(&tree, 200_000);
+                assert!((ratio - 1.0).abs() < 0.05, "{name}: {ratio}");
+                // It is there unless its axis ends within the trunk.
+                let is_within = length * sine < 0.1;
+                assert_eq!(surface.report.absorbed.len(), usize::from(is_within), "{name}");
+            }
+        }
+    }
+}
+
+/// Twigs that branch off while their own vessel is still within the trunk leave the trunk.
+#[test]
+fn laterals_of_a_flat_lateral_leave_the_trunk_before_it_does() {
+    let aside = |length: f32| Vec3::new(0.07 * length, 0.0, 1.0 + length);
+    let tree = tree(&[
         (Vec3::ZERO, NO_PARENT, 0.1),
         (Vec3::Z, 0, 0.1),
-        (Vec3::Z * 4.0, 1, 0.1),
-        (aside(1.0), 1, 0.04),
-        (aside(2.9), 3, 0.04),
-    ];
-    for level in 1..=3 {
-        let tree = tree(&nodes);
-        let settings = SurfaceSettings { level, ..SurfaceSettings::default() };
-        let surface = sound_surface("flat lateral", &tree, &settings);
-        assert!(surface.mesh.validate().is_sound(), "level {level}: {:?}", surface.report);
-        let ratio = volume(&surface.mesh) / union_volume(&tree, 200_000);
-        assert!((ratio - 1.0).abs() < 0.05, "level {level}: {ratio}");
+        (Vec3::Z * 8.0, 1, 0.1),
+        (aside(0.6), 1, 0.04),
+        (aside(5.0), 3, 0.04),
+        (aside(0.6) + Vec3::Y, 3, 0.03),
+    ]);
+    let surface = sound_surface("early lateral", &tree, &SurfaceSettings::default());
+    assert!(surface.mesh.validate().is_sound(), "{:?}", surface.report);
+    let tip = surface.mesh.positions.iter().map(|position| position.y).fold(0.0, f32::max);
+    assert!((tip - 1.03).abs() < 0.02, "{tip}");
+    let base = surface.mesh.positions.iter().filter(|position| position.y > 0.3);
+    assert!(base.clone().count() > 20 && base.clone().all(|position| (position.z - 1.6).abs() < 0.05), "its own place");
+}
+
+#[test]
+fn a_vessel_may_turn_back_sharply() {
+    for (wide, thin) in [(0.1, 0.1), (0.1, 0.07), (0.02, 0.02)] {
+        for degrees in (10..=170).step_by(10) {
+            let (sine, cosine) = (degrees as f32).to_radians().sin_cos();
+            let tree = tree(&[
+                (Vec3::ZERO, NO_PARENT, wide),
+                (Vec3::X, 0, wide),
+                (Vec3::X + Vec3::new(cosine, sine, 0.0), 1, thin),
+            ]);
+            for sides in [4, 16] {
+                let name = format!("{degrees}°, radii {wide} and {thin}, {sides} sides");
+                let settings = SurfaceSettings { most_sides: sides, least_sides: sides, ..SurfaceSettings::default() };
+                let check = sound_surface(&name, &tree, &settings).mesh.validate();
+                assert!(check.is_sound(), "{name}: {:?}", check.vessels);
+            }
+        }
     }
 }

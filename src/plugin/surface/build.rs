@@ -146,7 +146,7 @@ fn name_whole_nodes(surface: &mut Surface, remains: &Remains) {
     let whole = |node: u32| remains.places.get(node as usize).map_or(node, |place| place.node.0);
     surface.mesh.nodes.iter_mut().for_each(|node| *node = whole(*node));
     let report = &mut surface.report;
-    for nodes in [&mut report.remade, &mut report.left, &mut report.absorbed] {
+    for nodes in [&mut report.remade, &mut report.left, &mut report.unclosed, &mut report.absorbed] {
         nodes.iter_mut().for_each(|node| *node = NodeId(whole(node.0)));
     }
 }

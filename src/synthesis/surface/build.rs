@@ -4,13 +4,14 @@ use super::builder::{Builder, Built};
 use super::cage_mesh::as_it_is;
 use super::half_edges::HalfEdges;
 use super::limit::finish;
+use super::loops::{ClosingVessel, Looped};
 use super::mesh::SurfaceMesh;
 use super::remake::{Plan, Remade, remake};
 use super::report::SurfaceReport;
 use super::settings::{SurfaceError, SurfaceSettings};
 use super::shape::Shape;
 use crate::synthesis::pace::{Pace, at_once};
-use crate::synthesis::tree::VesselTree;
+use crate::synthesis::tree::{NodeId, VesselTree};
 use bevy_math::Vec3;
 
 /// The surface of a tree, and what was done for it.
@@ -36,11 +37,39 @@ impl Surface {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub async fn new_paced(tree: &VesselTree, settings: &SurfaceSettings, pace: &Pace) -> Result<Self, SurfaceError> {
+        Self::looped_paced(tree, &[], settings, pace).await
+    }
+
+    /// The surface of a network with loops: a tree, and the vessels that close its loops. Each of them adds a handle, so
+    /// that V − E + F is 2 less, or joins two trees; what could not be closed is in [`SurfaceReport::unclosed`].
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new); closing vessels between nodes that don't exist or lie at one place, and radii that are
+    /// not above 0.
+    pub fn looped(
+        tree: &VesselTree,
+        closing: &[ClosingVessel],
+        settings: &SurfaceSettings,
+    ) -> Result<Self, SurfaceError> {
+        at_once(Self::looped_paced(tree, closing, settings, &Pace::default()))
+    }
+
+    /// The same as [paced](crate::synthesis::pace) work.
+    ///
+    /// # Errors
+    /// Those of [`looped`](Self::looped).
+    pub async fn looped_paced(
+        tree: &VesselTree,
+        closing: &[ClosingVessel],
+        settings: &SurfaceSettings,
+        pace: &Pace,
+    ) -> Result<Self, SurfaceError> {
         settings.validate()?;
-        let shape = Shape::new(settings, tree.widest_radius());
+        let looped = Looped::of(tree, closing)?;
+        let shape = Shape::new(settings, looped.tree.widest_radius());
         // Coordinates from the middle of the tree: rounding doesn't depend on where the organ lies.
         let origin = middle(tree.positions());
-        let built = Builder::new(tree, &shape, settings.tips, origin).build_paced(&pace.part(0.0..0.3)).await;
+        let built = Builder::new(&looped, &shape, settings.tips, origin).build_paced(&pace.part(0.0..0.3)).await;
         let Built { cage, trunks, curves, layout, mut report } = built;
         let faces = cage.corners.len() as u64 * 4u64.pow(settings.level.saturating_sub(1));
         if 2 * faces > u64::from(u32::MAX) {
@@ -60,6 +89,12 @@ impl Surface {
             let plan = Plan { trunks, curves, layout, origin, faces_per_corner };
             let Remade { remade, left } = remake(&mut mesh, &plan, &pace.part(0.9..1.0)).await;
             (report.remade, report.left) = (remade, left);
+        }
+        if looped.len() > 0 {
+            mesh.nodes.iter_mut().for_each(|node| *node = looped.own(*node));
+            for node in report.remade.iter_mut().chain(&mut report.left) {
+                *node = NodeId(looped.own(node.0));
+            }
         }
         Ok(Self { mesh, report })
     }

@@ -6,20 +6,22 @@
 //! here, a hole of w × w faces lets a lateral of 4w sides out.
 
 use super::cage::Cage;
-use super::caps;
+use super::caps::End;
 use super::columns::Columns;
 use super::curve::{Curve, Lean};
 use super::direction::{across, unit};
 use super::exit::Exit;
 use super::layout::{Layout, Mouth};
+use super::loops::Looped;
 use super::report::SurfaceReport;
 use super::rings::{Rings, Start};
 use super::rows::{Opening, Row, rows};
+use super::seams::{self, OpenEnd, Seam};
 use super::settings::TipCap;
 use super::shape::Shape;
 use super::trunks::{Base, Trunks};
 use crate::synthesis::pace::{Pace, SHORT_STRETCH};
-use crate::synthesis::tree::{NodeId, VesselTree};
+use crate::synthesis::tree::NodeId;
 use bevy_math::{Vec3, ops};
 use std::f32::consts::FRAC_PI_4;
 
@@ -50,8 +52,10 @@ enum Hole {
 
 /// Makes a cage trunk by trunk.
 pub(super) struct Builder<'a> {
+    looped: &'a Looped<'a>,
     shape: &'a Shape,
     tips: TipCap,
+    seams: Vec<Seam>,
     trunks: Trunks,
     curves: Vec<Curve>,
     holes: Vec<Option<Hole>>,
@@ -75,16 +79,23 @@ pub(super) struct Built {
 
 impl<'a> Builder<'a> {
     /// A builder of the cage of a tree, in coordinates from an origin.
-    pub fn new(tree: &VesselTree, shape: &'a Shape, tips: TipCap, origin: Vec3) -> Self {
+    pub fn new(looped: &'a Looped<'a>, shape: &'a Shape, tips: TipCap, origin: Vec3) -> Self {
+        let tree = &*looped.tree;
         let trunks = Trunks::of(tree);
-        let curves = (0..trunks.len())
-            .map(|trunk| Curve::of(tree, trunks.nodes(trunk), trunks.base(trunk) != Base::Root, origin))
-            .collect();
+        let curve = |trunk: usize| {
+            let nodes = trunks.nodes(trunk);
+            let is_lateral = matches!(trunks.base(trunk), Base::Joint { .. });
+            let goes_on = [0, nodes.len() - 1].map(|end| looped.at(nodes[end]).is_some());
+            Curve::of(tree, nodes, is_lateral, goes_on, origin)
+        };
+        let curves = (0..trunks.len()).map(curve).collect();
         let holes = vec![None; trunks.len()];
         let cage = Cage { starts: vec![0], ..Cage::default() };
         Self {
+            looped,
             shape,
             tips,
+            seams: vec![Seam::Ahead; looped.len()],
             trunks,
             curves,
             holes,
@@ -110,9 +121,7 @@ impl<'a> Builder<'a> {
         let hole = self.holes[trunk].take();
         let (start, edge) = match hole {
             Some(Hole::Absorbed) => {
-                self.layout.begin(None, self.cage.corners.len());
-                let tip = self.trunks.nodes(trunk).last().copied();
-                self.report.absorbed.extend(tip.map(NodeId));
+                self.add_absorbed(trunk);
                 return;
             }
             Some(Hole::Open { start, right, lean, edge, mouth, doubtful }) => {
@@ -140,7 +149,8 @@ impl<'a> Builder<'a> {
             self.report.shortened += if row.is_shortened() { count } else { 0 };
             self.report.moved += if row.is_moved() { count } else { 0 };
         }
-        self.rings.lay(curve, &start, &mut rows, self.shape);
+        let spoke = self.spoke_at(trunk, &start);
+        self.rings.lay(curve, &start, &mut rows, self.shape, spoke);
         for row in &rows {
             if let Some(reach) = self.doubtful(row, self.curves[trunk].radius_at(row.length)) {
                 self.layout.doubt(trunk, row.length - reach, row.length + reach);
@@ -158,34 +168,53 @@ impl<'a> Builder<'a> {
 
     /// Length around a row over which faces may meet others, if its openings may lack room.
     fn doubtful(&self, row: &Row, radius: f32) -> Option<f32> {
-        let is_flat = |opening: &Opening| self.exits[opening.exit as usize].is_flat;
-        if row.openings.iter().any(is_flat) {
+        let any = |is: fn(&Exit) -> bool| row.openings.iter().any(|opening| is(&self.exits[opening.exit as usize]));
+        if any(|exit| exit.parting.is_some()) {
             return Some(row.half + BESIDE * radius);
         }
         let is_crowded = row.is_shortened() || row.is_moved() || row.openings.len() > 1;
-        is_crowded.then_some(row.half + DOUBTFUL * radius)
+        (is_crowded || any(|exit| exit.is_tight)).then_some(row.half + DOUBTFUL * radius)
     }
 
     /// The exits of a trunk's laterals. Laterals of one that ends within the trunk leave the trunk itself.
     fn find_exits(&mut self, trunk: usize) {
         let curve = &self.curves[trunk];
         self.exits.clear();
+        let root = match self.trunks.base(trunk) {
+            Base::Root { at } => Some(curve.length_of(at as usize)),
+            Base::Joint { .. } => None,
+        };
         let joint = |lateral: u32| match self.trunks.base(lateral as usize) {
             Base::Joint { at, .. } => curve.length_of(at as usize),
-            Base::Root => 0.0,
+            Base::Root { .. } => 0.0,
         };
-        let laterals = self.trunks.laterals(trunk).iter();
-        let mut pending: Vec<(u32, f32)> = laterals.rev().map(|&lateral| (lateral, joint(lateral))).collect();
+        // Some leave the vessel that this one leaves.
+        let own = self.trunks.laterals(trunk).iter().filter(|&&lateral| self.holes[lateral as usize].is_none());
+        let mut pending: Vec<(u32, f32)> = own.rev().map(|&lateral| (lateral, joint(lateral))).collect();
         while let Some((lateral, joint)) = pending.pop() {
             let branch = &self.curves[lateral as usize];
-            let exit = Exit::new(lateral, curve, joint, branch);
+            let mut exit = Exit::new(lateral, curve, joint, branch);
+            // It leaves beside the trunk's end, or in the bend of a trunk that runs through a root.
+            exit.is_tight |= root == Some(joint);
             self.report.laterals += 1;
             if exit.ends_within(curve, branch) {
                 self.holes[lateral as usize] = Some(Hole::Absorbed);
                 pending.extend(self.trunks.laterals(lateral as usize).iter().rev().map(|&lateral| (lateral, joint)));
-            } else {
-                self.exits.push(exit);
+                continue;
             }
+            if let Some(parting) = exit.parting {
+                // What leaves it before it parts from the trunk leaves the trunk itself.
+                let others = self.trunks.laterals(lateral as usize);
+                let is_early = |other: &u32| match self.trunks.base(*other as usize) {
+                    Base::Joint { at, .. } => branch.length_of(at as usize) < parting.on_lateral,
+                    Base::Root { .. } => false,
+                };
+                pending.extend(others[..others.partition_point(is_early)].iter().rev().map(|&other| {
+                    let base = self.curves[other as usize].at(0.0).center;
+                    (other, curve.foot(base, parting.on_trunk))
+                }));
+            }
+            self.exits.push(exit);
         }
     }
 
@@ -229,18 +258,72 @@ impl<'a> Builder<'a> {
 
     /// The first belt of a lateral from its hole's edge, or a root's end; and the tip's end.
     fn add_ends(&mut self, trunk: usize, edge: Option<Vec<u32>>) {
-        let (curve, nodes) = (&self.curves[trunk], self.trunks.nodes(trunk));
+        let nodes = self.trunks.nodes(trunk);
+        let (base_node, node) = (nodes[0], nodes[nodes.len() - 1]);
         let first = self.rings.rings[0];
         let last = self.rings.rings.len() - 1;
         self.layout.push_ring(self.rings.rings[last].length, self.cage.corners.len());
         match edge {
             Some(edge) => self.cage.sleeve(&edge, &first, self.bases[0]),
-            None => caps::add(&mut self.cage, &first, self.bases[0], caps::End::Base, TipCap::Round, nodes[0]),
+            None => {
+                let before = self.rings.rings[last.min(1)].station.center;
+                let base = OpenEnd { ring: first, before, base: self.bases[0], end: End::Base, node: base_node };
+                self.end_tube(base, TipCap::Round);
+            }
         }
-        let node = nodes[curve.place_at(curve.length())];
         let (ring, tip) = (self.rings.rings[last], self.cage.corners.len());
-        caps::add(&mut self.cage, &ring, self.bases[last], caps::End::Tip, self.tips, node);
+        let before = self.rings.rings[last.saturating_sub(1)].station.center;
+        self.end_tube(OpenEnd { ring, before, base: self.bases[last], end: End::Tip, node }, self.tips);
         self.layout.end([tip, self.cage.corners.len()]);
+    }
+
+    /// Closes the end of a tube, or joins it with the tube that goes on.
+    fn end_tube(&mut self, end: OpenEnd, cap: TipCap) {
+        let Some(number) = self.looped.at(end.node) else { return end.cap(&mut self.cage, cap) };
+        match std::mem::replace(&mut self.seams[number], Seam::Done) {
+            Seam::Ahead => self.seams[number] = Seam::Open(end),
+            Seam::Open(other) if seams::join(&mut self.cage, &other, &end) => {}
+            Seam::Open(other) => {
+                other.cap(&mut self.cage, cap);
+                end.cap(&mut self.cage, cap);
+                self.report.unclosed.push(NodeId(self.looped.own(end.node)));
+            }
+            Seam::Done => end.cap(&mut self.cage, cap),
+        }
+    }
+
+    /// The direction of a vertex that a trunk's last ring should face, if it ends in another tube or in its own beginning.
+    fn spoke_at(&self, trunk: usize, start: &Start) -> Option<Vec3> {
+        let nodes = self.trunks.nodes(trunk);
+        let number = self.looped.at(*nodes.last()?)?;
+        match &self.seams[number] {
+            Seam::Open(other) => Some(other.spoke(&self.cage)),
+            Seam::Ahead if self.looped.at(nodes[0]) == Some(number) => {
+                let station = self.curves[trunk].at(start.length);
+                let (sine, cosine) = ops::sin_cos(start.columns.at(0.0));
+                Some(station.right * cosine + station.up() * sine)
+            }
+            Seam::Ahead | Seam::Done => None,
+        }
+    }
+
+    /// Notes a lateral that ends within its trunk. If it was to go on in another tube, that one is closed.
+    fn add_absorbed(&mut self, trunk: usize) {
+        let corner = self.cage.corners.len();
+        self.layout.begin(None, corner);
+        let Some(&tip) = self.trunks.nodes(trunk).last() else { return };
+        self.report.absorbed.push(NodeId(self.looped.own(tip)));
+        let Some(number) = self.looped.at(tip) else { return };
+        match std::mem::replace(&mut self.seams[number], Seam::Done) {
+            Seam::Ahead => {}
+            Seam::Open(other) => {
+                self.layout.push_ring(0.0, corner);
+                other.cap(&mut self.cage, self.tips);
+                self.layout.end([corner, self.cage.corners.len()]);
+            }
+            Seam::Done => return,
+        }
+        self.report.unclosed.push(NodeId(self.looped.own(tip)));
     }
 
     /// Tells the laterals where their holes are.
@@ -277,9 +360,17 @@ impl<'a> Builder<'a> {
         let wide = ring.station.radius * self.shape.apothem(row.sides);
         let point = station.center + out * ring.station.radius;
         let lift = exit.lift(branch, &station, wide);
-        let shift = point - exit.point;
-        let shift = shift - out * shift.dot(out);
-        let reach = (LEAN * shift.length()).max(2.0 * exit.radius);
+        let aside = point - exit.point;
+        let mut shift = aside - out * aside.dot(out);
+        let mut reach = (LEAN * shift.length()).max(2.0 * exit.radius);
+        if let Some(parting) = exit.parting {
+            // Half in its trunk it would have no room for its first ring.
+            let height = (branch.at(lift).center - station.center).dot(out);
+            shift += out * (wide + 1.25 * exit.radius - height).max(0.0);
+            if !parting.is_clear {
+                reach = reach.max(8.0 * (branch.length() - lift));
+            }
+        }
         let lean = Lean { shift, from: lift, to: lift + reach };
         let begin = branch.at(lift);
         let normal = unit(begin.ahead + out).unwrap_or(begin.ahead);

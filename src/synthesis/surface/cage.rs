@@ -2,8 +2,8 @@
 //!
 //! In: rings. Out: belts of faces between them, with texture coordinates.
 
-use super::curve::Station;
 use super::rings::Ring;
+use super::spline::Station;
 use bevy_math::{Vec2, Vec3};
 use std::f32::consts::TAU;
 

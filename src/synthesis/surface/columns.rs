@@ -29,6 +29,13 @@ impl Columns {
         Self::even(sides, self.angles.iter().enumerate().map(offset).sum::<f32>() / count)
     }
 
+    /// Even columns with a line at an angle that turn least from these.
+    pub fn evened_to(&self, sides: u32, angle: f32) -> Self {
+        let (even, step) = (self.evened(sides), TAU / sides as f32);
+        let steps = ((even.angles[0] - angle) / step).round();
+        Self::even(sides, angle + steps * step)
+    }
+
     /// The angle at a share of the way round, in columns: from 0 to 1, or a turn more for each whole number.
     pub fn at(&self, share: f32) -> f32 {
         let (turns, count) = (share.floor(), self.angles.len());

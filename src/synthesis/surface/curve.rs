@@ -5,6 +5,7 @@
 //! curve is a cubic Hermite spline with unit speed at the nodes; the radius is that of the round cones.
 
 use super::direction::{across, turn, unit};
+use super::spline::{Knot, Station, between, hermite};
 use crate::synthesis::{
     segment_index::start_radius,
     tree::{NO_PARENT, VesselTree},
@@ -19,43 +20,10 @@ const WIDENING: f32 = 4.0;
 const EASE: f32 = 3.0;
 /// Distance of knots up to which bulges count, in radii.
 const NEAR: f32 = 6.0;
+/// Steps towards the foot of a point: each adds about two digits where the curve is no tighter than a vessel can be.
+const FOOT_STEPS: usize = 3;
 /// Segments shorter than this share of the radius have no direction of their own.
 const POINT: f32 = 1e-3;
-
-/// A point of a curve with all that a cross-section needs.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Station {
-    pub center: Vec3,
-    /// Unit tangent, from base to tip.
-    pub ahead: Vec3,
-    /// Unit vector across, the zero of angles.
-    pub right: Vec3,
-    /// Radius of the vessel.
-    pub radius: f32,
-}
-
-impl Station {
-    /// Unit vector across, a quarter turn from [`right`](Self::right).
-    pub fn up(&self) -> Vec3 {
-        self.ahead.cross(self.right)
-    }
-}
-
-/// A kept node.
-#[derive(Clone, Copy, Debug)]
-struct Knot {
-    center: Vec3,
-    ahead: Vec3,
-    right: Vec3,
-    /// Length from the base.
-    length: f32,
-    /// Angle by which the curve has turned since the base, with bulges of its radius.
-    turned: f32,
-    /// Place among the trunk's nodes; for a point on a segment, that of the node before it.
-    place: u32,
-    /// Whether it is a point on a segment.
-    is_between: bool,
-}
 
 /// A node's place on the curve and its radius.
 #[derive(Clone, Copy, Debug)]
@@ -89,13 +57,15 @@ pub(super) struct Curve {
 impl Curve {
     /// The curve of a trunk. `origin` is subtracted from positions.
     ///
-    /// `is_lateral`: the first node is another trunk's, and has that one's radius.
-    pub fn of(tree: &VesselTree, nodes: &[u32], is_lateral: bool, origin: Vec3) -> Self {
+    /// `is_lateral`: the first node is another trunk's, and has that one's radius. `goes_on`: its base,
+    /// and its tip, lie within a segment whose other half ends there, too.
+    pub fn of(tree: &VesselTree, nodes: &[u32], is_lateral: bool, goes_on: [bool; 2], origin: Vec3) -> Self {
         let mut curve = Self::default();
         curve.set_marks(tree, nodes, is_lateral);
         curve.keep_nodes(tree, nodes, origin);
         curve.ease_long_segments();
         curve.set_directions();
+        curve.set_ends(tree, nodes, goes_on);
         curve.set_lengths();
         curve.set_mark_lengths();
         curve
@@ -194,6 +164,18 @@ impl Curve {
         }
         let first = self.knots[0].ahead.any_orthonormal_vector();
         self.set_frames(first);
+    }
+
+    /// Sets the directions of ends that go on: those of their segments.
+    fn set_ends(&mut self, tree: &VesselTree, nodes: &[u32], goes_on: [bool; 2]) {
+        let ([first, second, ..], [.., before, last]) = (nodes, nodes) else { return };
+        let tip = self.knots.len() - 1;
+        for (is_set, knot, [from, to]) in [(goes_on[0], 0, [first, second]), (goes_on[1], tip, [before, last])] {
+            if is_set && let Some(ahead) = unit(tree.positions()[*to as usize] - tree.positions()[*from as usize]) {
+                self.knots[knot].ahead = ahead;
+                self.set_frames(self.knots[0].right);
+            }
+        }
     }
 
     /// Sets the frames from that of the base.
@@ -329,6 +311,15 @@ impl Curve {
         (count > 1).then_some((second - 1, second))
     }
 
+    /// The length at the foot of a point, from one near it.
+    pub fn foot(&self, point: Vec3, mut length: f32) -> f32 {
+        for _ in 0..FOOT_STEPS {
+            let here = self.at(length);
+            length = (length + (point - here.center).dot(here.ahead)).clamp(0.0, self.length());
+        }
+        length
+    }
+
     /// The station at a length; beyond the ends the curve goes straight on.
     pub fn at(&self, length: f32) -> Station {
         let radius = self.radius_at(length);
@@ -345,30 +336,6 @@ impl Curve {
     }
 }
 
-impl Knot {
-    /// The station on the straight line through the knot.
-    fn straight_on(&self, length: f32, radius: f32) -> Station {
-        let Self { center, ahead, right, .. } = *self;
-        Station { center: center + ahead * (length - self.length), ahead, right, radius }
-    }
-}
-
-/// The station between two knots, or straight on beyond them.
-fn between(a: &Knot, b: &Knot, length: f32, radius: f32) -> Station {
-    if length <= a.length {
-        return a.straight_on(length, radius);
-    }
-    if length >= b.length {
-        return b.straight_on(length, radius);
-    }
-    let share = (length - a.length) / (b.length - a.length);
-    let chord = a.center.distance(b.center);
-    let (center, velocity) = hermite(a, b, chord, share);
-    let ahead = unit(velocity).unwrap_or(a.ahead);
-    let right = across(turn(a.ahead, ahead) * a.right, ahead);
-    Station { center, ahead, right, radius }
-}
-
 /// Lengths of marks between two knots, in proportion to those along the chords.
 fn spread(marks: &mut [Mark], from: f32, to: f32) {
     let [first, .., last] = marks else { return };
@@ -378,17 +345,4 @@ fn spread(marks: &mut [Mark], from: f32, to: f32) {
         let share = if span > 0.0 { (mark.chords - start) / span } else { number as f32 / count as f32 };
         mark.length = from + share * (to - from);
     }
-}
-
-/// Position and velocity on the spline between two knots.
-fn hermite(a: &Knot, b: &Knot, chord: f32, share: f32) -> (Vec3, Vec3) {
-    let (t, t2, t3) = (share, share * share, share * share * share);
-    let [va, vb] = [a.ahead * chord, b.ahead * chord];
-    let center = a.center * (2.0 * t3 - 3.0 * t2 + 1.0)
-        + va * (t3 - 2.0 * t2 + t)
-        + b.center * (3.0 * t2 - 2.0 * t3)
-        + vb * (t3 - t2);
-    let velocity =
-        (b.center - a.center) * (6.0 * t - 6.0 * t2) + va * (3.0 * t2 - 4.0 * t + 1.0) + vb * (3.0 * t2 - 2.0 * t);
-    (center, velocity)
 }

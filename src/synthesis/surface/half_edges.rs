@@ -20,8 +20,8 @@ const NONE: u32 = u32::MAX;
 enum Faces {
     /// Every face has four half-edges.
     Quads,
-    /// The half-edges after and before each one.
-    Polygons { next: Vec<u32>, previous: Vec<u32> },
+    /// For each half-edge, how many come before it in its face, and how many come after.
+    Polygons(Vec<[u8; 2]>),
 }
 
 impl Faces {
@@ -29,7 +29,10 @@ impl Faces {
     fn next(&self, half_edge: u32) -> u32 {
         match self {
             Self::Quads => (half_edge & !3) | ((half_edge + 1) & 3),
-            Self::Polygons { next, .. } => next[half_edge as usize],
+            Self::Polygons(places) => match places[half_edge as usize] {
+                [before, 0] => half_edge - u32::from(before),
+                _ => half_edge + 1,
+            },
         }
     }
 
@@ -37,7 +40,10 @@ impl Faces {
     fn previous(&self, half_edge: u32) -> u32 {
         match self {
             Self::Quads => (half_edge & !3) | (half_edge.wrapping_sub(1) & 3),
-            Self::Polygons { previous, .. } => previous[half_edge as usize],
+            Self::Polygons(places) => match places[half_edge as usize] {
+                [0, after] => half_edge + u32::from(after),
+                _ => half_edge - 1,
+            },
         }
     }
 }
@@ -61,31 +67,21 @@ impl HalfEdges {
     /// The half-edges of a cage. It must be closed and oriented.
     pub async fn of_paced(cage: Cage, pace: &Pace) -> Self {
         let Cage { vertices, starts, corners, uvs } = cage;
-        let (mut next, mut previous) = (vec![0; corners.len()], vec![0; corners.len()]);
+        let mut places = Vec::with_capacity(corners.len());
         for face in starts.windows(2) {
-            let (first, end) = (face[0], face[1]);
-            for half_edge in first..end {
-                let after = if half_edge + 1 == end { first } else { half_edge + 1 };
-                next[half_edge as usize] = after;
-                previous[after as usize] = half_edge;
-            }
+            // A cage's faces have four corners or five.
+            let count = (face[1] - face[0]) as u8;
+            places.extend((0..count).map(|before| [before, count - 1 - before]));
         }
+        let faces = Faces::Polygons(places);
         pace.rest(0.5).await;
-        let (twins, leaving) = pair(&corners, &next, vertices.positions.len());
-        Self {
-            vertices,
-            origins: corners,
-            uvs,
-            twins,
-            leaving,
-            faces: Faces::Polygons { next, previous },
-            face_starts: starts,
-        }
+        let (twins, leaving) = pair(&corners, &faces, vertices.positions.len());
+        Self { vertices, origins: corners, uvs, twins, leaving, faces, face_starts: starts }
     }
 
     /// Number of half-edges.
     pub fn len(&self) -> usize {
-        self.origins.len()
+        self.twins.len()
     }
 
     /// The next subdivision.
@@ -277,7 +273,7 @@ pub(super) struct Split {
     /// Vertex in the face of each half-edge.
     pub face_of: Vec<u32>,
     face_uvs: Vec<Vec2>,
-    edges: Vec<u32>,
+    pub edges: Vec<u32>,
     pub first_face: u32,
     pub first_edge: u32,
 }
@@ -287,6 +283,11 @@ impl Split {
     #[inline]
     pub fn edge(&self, half_edge: u32) -> u32 {
         self.first_edge + self.edges[half_edge as usize]
+    }
+
+    /// Gives a half-edge another vertex than its twin.
+    pub fn set_edge(&mut self, half_edge: u32, vertex: u32) {
+        self.edges[half_edge as usize] = vertex - self.first_edge;
     }
 
     /// Texture coordinates of the vertex in a half-edge's face.
@@ -303,9 +304,10 @@ impl Split {
 }
 
 /// The twin of every half-edge, and the first half-edge of every vertex.
-fn pair(origins: &[u32], next: &[u32], vertices: usize) -> (Vec<u32>, Vec<u32>) {
+fn pair(origins: &[u32], faces: &Faces, vertices: usize) -> (Vec<u32>, Vec<u32>) {
+    let end = |half_edge: usize| origins[faces.next(half_edge as u32) as usize];
     // Half-edges by their lower vertex: each list is about as long as a vertex has edges.
-    let lower = |half_edge: usize| origins[half_edge].min(origins[next[half_edge] as usize]) as usize;
+    let lower = |half_edge: usize| origins[half_edge].min(end(half_edge)) as usize;
     let mut starts = vec![0u32; vertices + 1];
     for half_edge in 0..origins.len() {
         starts[lower(half_edge) + 1] += 1;
@@ -318,15 +320,13 @@ fn pair(origins: &[u32], next: &[u32], vertices: usize) -> (Vec<u32>, Vec<u32>) 
     let (mut twins, mut leaving) = (vec![NONE; origins.len()], vec![NONE; vertices]);
     for half_edge in 0..origins.len() {
         let (low, from) = (lower(half_edge), origins[half_edge]);
-        let to = origins[next[half_edge] as usize];
+        let to = end(half_edge);
         if leaving[from as usize] == NONE {
             leaving[from as usize] = half_edge as u32;
         }
         let seen = &list[starts[low] as usize..ends[low] as usize];
         let twin = seen.iter().copied().find(|&other| {
-            twins[other as usize] == NONE
-                && origins[other as usize] == to
-                && origins[next[other as usize] as usize] == from
+            twins[other as usize] == NONE && origins[other as usize] == to && end(other as usize) == from
         });
         if let Some(twin) = twin {
             twins[half_edge] = twin;

@@ -16,7 +16,6 @@ use std::f32::consts::TAU;
 
 /// More edges than any vertex of a cage has.
 const MOST_EDGES: usize = 32;
-const NONE: u32 = u32::MAX;
 
 /// Makes the mesh of the next subdivision. What is no longer needed is dropped on the way, so that a large mesh needs
 /// hardly more memory than it takes itself.
@@ -24,14 +23,14 @@ pub(super) async fn finish(mut half_edges: HalfEdges, origin: Vec3, pace: &Pace)
     let mut split = half_edges.split_paced(&pace.part(0.0..0.4)).await;
     let mut mesh = SurfaceMesh::default();
     (mesh.positions, mesh.normals) = limits(&half_edges, &split, origin, &pace.part(0.4..0.7)).await;
-    split.vertices.positions = Vec::new();
-    let charts = Charts::of(&half_edges, &split, &pace.part(0.7..0.8)).await;
-    (half_edges.uvs, half_edges.vertices) = (Vec::new(), Vertices::default());
+    (half_edges.vertices, split.vertices.positions) = (Vertices::default(), Vec::new());
+    let charts = Charts::of(&mut half_edges, &mut split, &pace.part(0.7..0.8)).await;
+    half_edges.uvs = Vec::new();
     mesh.faces.reserve_exact(half_edges.len());
     let quad = |half_edge: usize| mesh.faces.push(charts.quad(&half_edges, &split, half_edge as u32));
     pace.part(0.8..0.9).each(half_edges.len(), quad).await;
     let vertices = split.vertices;
-    drop((half_edges, split.face_of));
+    drop((half_edges, split.face_of, split.edges));
     (mesh.uvs, mesh.copies) = (charts.uvs, charts.copies);
     (mesh.radii, mesh.nodes) = (vertices.radii, vertices.nodes);
     mesh.complete(&pace.part(0.9..1.0)).await;
@@ -207,18 +206,16 @@ struct Charts {
     copies: Vec<u32>,
     /// Vertex of each half-edge's corner.
     corners: Vec<u32>,
-    /// Copy of the vertex on a half-edge's edge, for the half-edge whose coordinates differ from its twin's.
-    edges: Vec<u32>,
 }
 
 impl Charts {
-    async fn of(mesh: &HalfEdges, split: &Split, pace: &Pace) -> Self {
+    /// Takes the place of the half-edges' origins, and gives edges of a seam two vertices.
+    async fn of(mesh: &mut HalfEdges, split: &mut Split, pace: &Pace) -> Self {
         let unique = split.vertices.radii.len();
         let mut charts = Self {
             uvs: Vec::with_capacity(unique + unique / 4),
             copies: Vec::new(),
-            corners: vec![0; mesh.len()],
-            edges: vec![NONE; mesh.len()],
+            corners: std::mem::take(&mut mesh.origins),
         };
         charts.uvs.resize(split.first_face as usize, Vec2::ZERO);
         charts.uvs.extend((0..mesh.face_count()).map(|face| split.face_uv(mesh.face(face).start)));
@@ -234,7 +231,8 @@ impl Charts {
             let half_edge = half_edge as u32;
             let twin = mesh.twin(half_edge);
             if twin < half_edge && middle(half_edge) != middle(twin) {
-                charts.edges[half_edge as usize] = charts.copy(split.edge(half_edge), middle(half_edge));
+                let copy = charts.copy(split.edge(half_edge), middle(half_edge));
+                split.set_edge(half_edge, copy);
             }
         };
         pace.part(0.7..1.0).each(mesh.len(), edge).await;
@@ -268,11 +266,7 @@ impl Charts {
     /// The quad in the place of a half-edge.
     #[inline]
     fn quad(&self, mesh: &HalfEdges, split: &Split, half_edge: u32) -> [u32; 4] {
-        let edge = |half_edge: u32| match self.edges[half_edge as usize] {
-            NONE => split.edge(half_edge),
-            copy => copy,
-        };
         let here = half_edge as usize;
-        [self.corners[here], edge(half_edge), split.face_of[here], edge(mesh.previous(half_edge))]
+        [self.corners[here], split.edge(half_edge), split.face_of[here], split.edge(mesh.previous(half_edge))]
     }
 }

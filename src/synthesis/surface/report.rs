@@ -19,6 +19,8 @@ pub struct SurfaceReport {
     /// Joints whose faces still meet each other, by a node of each: their segments run through each other so that the
     /// outline of their union has holes.
     pub left: Vec<NodeId>,
+    /// Loops that stay open, by a node of each: it lies within the lumen of another vessel.
+    pub unclosed: Vec<NodeId>,
     /// Last nodes of vessels that end within the lumen of the vessel that they leave. They have no faces.
     pub absorbed: Vec<NodeId>,
 }

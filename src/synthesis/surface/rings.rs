@@ -5,10 +5,11 @@
 //! then one of the two rings is left out, or both planes are tilted to stand alike.
 
 use super::columns::Columns;
-use super::curve::{Curve, Station};
+use super::curve::Curve;
 use super::direction::unit;
 use super::rows::Row;
 use super::shape::Shape;
+use super::spline::Station;
 use bevy_math::Vec3;
 
 /// The longest distance between rings, in radii.
@@ -25,6 +26,9 @@ const LEAST_APART: f32 = 0.1;
 const FAR: f32 = 3.0;
 /// The most by which a ring is moved or widened for the surface's sake, in radii.
 const MOST_SWELL: f32 = 0.25;
+/// Length over which a bend is sharp, in radii, and the cosine of its angle: 100°.
+const BEND: f32 = 7.0;
+const SHARP: f32 = -0.17;
 /// Passes in which rings are left out or tilted.
 const PASSES: usize = 6;
 /// Directions in which the distance of two rings is checked.
@@ -45,7 +49,7 @@ pub(super) struct Ring {
     pub radius: f32,
     /// Its first angle in the list.
     pub first_angle: u32,
-    /// Whether a neighbour met it before it was tilted, or one beside it left out.
+    /// Whether faces beside it may meet others: a neighbour met it before it was tilted, or it lies in a sharp bend.
     pub is_doubtful: bool,
     /// Rings of one row have one number, and a common plane. Others may be left out.
     row: Option<u32>,
@@ -72,6 +76,14 @@ pub(super) struct Start {
     pub sides: u32,
 }
 
+impl Station {
+    /// How far the surface at a ring here lies to the inner side of a bend between the middles of its neighbours.
+    pub fn cut_between(&self, before: Vec3, after: Vec3) -> Vec3 {
+        let cut = (self.center - before + self.center - after) / 6.0;
+        (cut - self.ahead * self.ahead.dot(cut)).clamp_length_max(MOST_SWELL * self.radius)
+    }
+}
+
 /// All rings of a trunk.
 #[derive(Debug, Default)]
 pub(super) struct Rings {
@@ -82,8 +94,9 @@ pub(super) struct Rings {
 }
 
 impl Rings {
-    /// Lays the rings of a trunk. Sets the columns of its rows' openings.
-    pub fn lay(&mut self, curve: &Curve, start: &Start, rows: &mut [Row], shape: &Shape) {
+    /// Lays the rings of a trunk, the last one with a vertex in a direction if one is given. Sets the columns of its rows'
+    /// openings.
+    pub fn lay(&mut self, curve: &Curve, start: &Start, rows: &mut [Row], shape: &Shape, spoke: Option<Vec3>) {
         self.rings.clear();
         self.angles.clear();
         self.push(curve, start.length, start.sides, None);
@@ -110,11 +123,11 @@ impl Rings {
             }
             (columns, before) = (next, row.length + row.half);
         }
-        self.end(curve, before, &columns, shape);
+        self.end(curve, before, &columns, shape, spoke);
         self.settle();
     }
 
-    fn end(&mut self, curve: &Curve, before: f32, columns: &Columns, shape: &Shape) {
+    fn end(&mut self, curve: &Curve, before: f32, columns: &Columns, shape: &Shape, spoke: Option<Vec3>) {
         let radius = curve.radius_at(curve.length());
         // A root without a segment is a ball: both ends on one ring.
         if self.rings.len() == 1 && self.rings[0].length == 0.0 && curve.length() < LEAST_APART * radius {
@@ -122,7 +135,10 @@ impl Rings {
         }
         let tip = curve.length().max(before + 0.3 * radius);
         let sides = shape.sides_of(radius);
-        let even = columns.evened(sides);
+        let even = match spoke {
+            Some(spoke) => columns.evened_to(sides, curve.at(tip).angle_of(spoke)),
+            None => columns.evened(sides),
+        };
         self.fill(curve, [before, tip], [columns, &even], sides, shape);
         let last = self.rings.len() - 1;
         let sides = sides.clamp(self.rings[last].sides / 2, self.rings[last].sides * 2).max(4);
@@ -171,6 +187,7 @@ impl Rings {
         for ring in &mut self.rings {
             ring.normal = within_tilt(ring.normal, ring.station.ahead);
         }
+        self.doubt_bends();
         for _ in 0..PASSES {
             if !self.settle_once() {
                 break;
@@ -214,6 +231,20 @@ impl Rings {
         has_changed
     }
 
+    /// Doubts rings within sharp bends: the faces on the inner side may meet.
+    fn doubt_bends(&mut self) {
+        let mut first = 0;
+        for last in 1..self.rings.len() {
+            let Ring { station, length, .. } = self.rings[last];
+            while length - self.rings[first].length > BEND * station.radius {
+                first += 1;
+            }
+            if (first..last).any(|ring| self.rings[ring].station.ahead.dot(station.ahead) < SHARP) {
+                self.rings[first..=last].iter_mut().for_each(|ring| ring.is_doubtful = true);
+            }
+        }
+    }
+
     /// Moves and widens rings so that the surface follows the curve.
     ///
     /// In the limit, the surface at a ring is a mean of that ring, four times, and of its neighbours: it cuts corners and
@@ -224,9 +255,7 @@ impl Rings {
             let [a, b, c] = [index - 1, index, index + 1].map(|ring| self.rings[ring]);
             let (from, here, to) = (before, b.station.center, c.station.center);
             before = here;
-            let (most, ahead) = (MOST_SWELL * b.station.radius, b.station.ahead);
-            let cut = (here - from + here - to) / 6.0;
-            let aside = (cut - ahead * ahead.dot(cut)).clamp_length_max(most);
+            let (most, aside) = (MOST_SWELL * b.station.radius, b.station.cut_between(from, to));
             let span = c.length - a.length;
             let moved = (a.length - 2.0 * b.length + c.length) / 6.0;
             let slope = if span > 0.0 { (c.station.radius - a.station.radius) / span } else { 0.0 };

@@ -1,5 +1,7 @@
 //! What a user chooses of a surface, and what is wrong with a choice.
 
+use crate::synthesis::tree::{NodeId, TreeError};
+
 /// How fine a surface is.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
@@ -83,7 +85,7 @@ impl Default for SurfaceSettings {
 }
 
 /// Why there is no surface.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// More subdivisions than any machine has memory for.
     #[error("a surface of level {level} is too fine; set level to {most} or less", most = SurfaceSettings::MOST_LEVEL)]
@@ -110,5 +112,30 @@ pub enum SurfaceError {
     TooManyFaces {
         /// Number of faces.
         faces: u64,
+    },
+    /// A vessel that closes a loop, at a node that isn't there.
+    #[error("a vessel that closes a loop ends at node {}, but the tree has {nodes} nodes; count from 0", node.0)]
+    ClosingNode {
+        /// The node given.
+        node: NodeId,
+        /// Number of nodes.
+        nodes: usize,
+    },
+    /// A loop whose nodes lie at one place.
+    #[error("the loop closed between nodes {} and {} has no length; leave it out", ends[0].0, ends[1].0)]
+    ClosingLength {
+        /// The nodes given.
+        ends: [NodeId; 2],
+    },
+    /// A network that cannot be hung up as a tree.
+    #[error(transparent)]
+    Network(#[from] TreeError),
+    /// A vessel that closes a loop, without a radius.
+    #[error("the vessel that closes a loop between nodes {} and {} has radius {radius}; set it above 0", ends[0].0, ends[1].0)]
+    ClosingRadius {
+        /// The nodes given.
+        ends: [NodeId; 2],
+        /// The radius given.
+        radius: f32,
     },
 }

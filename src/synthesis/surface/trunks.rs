@@ -15,8 +15,11 @@ const FEW: usize = 64;
 /// Where a trunk begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Base {
-    /// At a root of the tree, which it closes with an end of its own.
-    Root,
+    /// At a root of the tree, which it closes with an end of its own, or at the tip behind a root that it runs through.
+    Root {
+        /// The place of the root among the trunk's nodes.
+        at: u32,
+    },
     /// At a node of another trunk: the trunk's first node is that one's node.
     Joint {
         /// The other trunk, which comes before this one.
@@ -57,9 +60,9 @@ impl Trunks {
             }
             let (trunk, start) = (trunks.bases.len() as u32, trunks.nodes.len());
             if parent == NO_PARENT {
-                trunks.bases.push(Base::Root);
                 trunks.nodes.extend(courses.along(courses.back[node]));
                 trunks.nodes[start..].reverse();
+                trunks.bases.push(Base::Root { at: (trunks.nodes.len() - start) as u32 });
             } else {
                 let (trunk, at) = places[parent as usize];
                 trunks.bases.push(Base::Joint { trunk, at });
@@ -100,7 +103,7 @@ impl Trunks {
         let mut sorted: Vec<(u32, u32, u32)> = (0u32..)
             .zip(&self.bases)
             .filter_map(|(lateral, base)| match *base {
-                Base::Root => None,
+                Base::Root { .. } => None,
                 Base::Joint { trunk, at } => Some((trunk, at, lateral)),
             })
             .collect();
@@ -134,15 +137,16 @@ impl Courses {
             }
             let leaving = |child: usize| leaving(tree, &children, child);
             let Some(ahead) = arriving(tree, node) else {
-                next[node] = widest(tree, &children, node, |_| true);
+                next[node] = widest(tree, &children, node, |_| Some(0.0));
                 if next[node] != NONE {
                     let first = leaving(next[node] as usize);
-                    let is_other_side = |child: usize| child as u32 != next[node] && first.dot(leaving(child)) < 0.0;
-                    back[node] = widest(tree, &children, node, is_other_side);
+                    let straightness = |child: usize| Some(-first.dot(leaving(child))).filter(|&share| share > 0.0);
+                    back[node] = widest(tree, &children, node, straightness);
                 }
                 continue;
             };
-            next[node] = widest(tree, &children, node, |child| ahead.dot(leaving(child)) >= 0.0);
+            let straightness = |child: usize| Some(ahead.dot(leaving(child))).filter(|&share| share >= 0.0);
+            next[node] = widest(tree, &children, node, straightness);
         }
         Self { next, back }
     }
@@ -160,15 +164,17 @@ impl Courses {
     }
 }
 
-/// The widest child that may follow a node, the first of equals.
-fn widest(tree: &VesselTree, children: &Children, node: usize, may: impl Fn(usize) -> bool) -> u32 {
-    let mut widest = NONE;
+/// The widest child that may follow a node: one with a straightness. Of equals the straightest, of these the first.
+fn widest(tree: &VesselTree, children: &Children, node: usize, straightness: impl Fn(usize) -> Option<f32>) -> u32 {
+    let mut widest = (NONE, 0.0, 0.0);
     for &child in children.of(node) {
-        if may(child as usize) && (widest == NONE || tree.radii()[child as usize] > tree.radii()[widest as usize]) {
-            widest = child;
+        let Some(straightness) = straightness(child as usize) else { continue };
+        let radius = tree.radii()[child as usize];
+        if widest.0 == NONE || radius > widest.1 || (radius == widest.1 && straightness > widest.2) {
+            widest = (child, radius, straightness);
         }
     }
-    widest
+    widest.0
 }
 
 /// Unit direction in which a vessel arrives at a node, over a radius; `None` for a root, zero if it has no length.

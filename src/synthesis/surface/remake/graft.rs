@@ -8,8 +8,11 @@ use crate::synthesis::surface::curve::Curve;
 use crate::synthesis::surface::direction::{across, unit};
 use crate::synthesis::surface::mesh::SurfaceMesh;
 use crate::synthesis::surface::trunks::Trunks;
-use bevy_math::{Vec2, Vec3, Vec4, ops};
+use bevy_math::{Vec2, Vec3, Vec4};
 use std::{collections::BTreeMap, f32::consts::TAU};
+
+/// Cosine of the angle between a tube's normal and that of the faces from which on a vertex has the latter: 20°.
+const CREASED: f32 = 0.94;
 
 /// What takes the place of some faces.
 #[derive(Debug)]
@@ -22,6 +25,25 @@ pub(super) struct Graft {
     pub triangles: Vec<[u32; 3]>,
     /// The tubes, in the coordinates of the curves.
     pub cones: Vec<Cone>,
+}
+
+impl Graft {
+    /// Unit normals of the new vertices: means of those of their faces, weighted by area.
+    fn normals(&self, old: &[Vec3]) -> Vec<Vec3> {
+        let mut sums = vec![Vec3::ZERO; self.positions.len()];
+        let position = |vertex: u32| match (vertex as usize).checked_sub(old.len()) {
+            None => old[vertex as usize],
+            Some(new) => self.positions[new],
+        };
+        for &corners in &self.triangles {
+            let [a, b, c] = corners.map(position);
+            let normal = (b - a).cross(c - a);
+            for new in corners.into_iter().filter_map(|corner| (corner as usize).checked_sub(old.len())) {
+                sums[new] += normal;
+            }
+        }
+        sums.into_iter().map(|sum| unit(sum).unwrap_or(Vec3::X)).collect()
+    }
 }
 
 /// A point on a tube.
@@ -61,7 +83,7 @@ impl Lines<'_> {
         let station = self.curves[cone.trunk as usize].at(length);
         let away = point - cone.centers[0].lerp(cone.centers[1], share);
         let out = unit(away).unwrap_or_else(|| across(away, station.ahead));
-        let angle = ops::atan2(out.dot(station.up()), out.dot(station.right));
+        let angle = station.angle_of(out);
         Some(Spot { trunk: cone.trunk, length, angle, radius: station.radius, out, ahead: station.ahead })
     }
 
@@ -130,8 +152,11 @@ impl<'a> Draft<'a> {
         let (unique, first) = (self.old.unique() as u32, self.positions.len() as u32);
         let nearest = |position: Vec3| lines.spot(&graft.cones, position, None);
         let spots: Vec<Option<Spot>> = graft.positions.iter().map(|&position| nearest(position)).collect();
-        for (&position, spot) in graft.positions.iter().zip(&spots) {
+        let normals = graft.normals(&self.old.positions[..unique as usize]);
+        for ((&position, spot), normal) in graft.positions.iter().zip(&spots).zip(normals) {
             let (out, ahead) = spot.map_or((Vec3::X, Vec3::Z), |spot| (spot.out, spot.ahead));
+            // In a crease, the surface is that of no tube.
+            let out = if out.dot(normal) < CREASED { normal } else { out };
             self.positions.push(position);
             self.normals.push(out);
             self.tangents.push(across(ahead.cross(out), out).extend(1.0));

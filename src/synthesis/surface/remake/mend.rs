@@ -1,11 +1,12 @@
 //! Mends one knot: finds a ball around it in which the outline of the tubes can take the place of the faces.
 
 use super::ball::Ball;
-use super::contour;
+use super::contour::{self, Outline};
 use super::graft::Graft;
 use super::knots::Knot;
 use super::patch::{Rim, belt, within};
 use super::site::Site;
+use super::smooth::smooth;
 use crate::synthesis::mesh::self_intersections;
 use bevy_math::Vec3;
 use std::collections::BTreeMap;
@@ -104,19 +105,26 @@ impl Site<'_> {
         }
         let patch = within(contour::outline(&cones, &inner, step)?, &inner);
         let patch_rim = Rim::of(patch.triangles.iter().map(|triangle| &triangle[..]))?;
+        let mut is_fixed = vec![false; patch.positions.len()];
+        patch_rim.loops.iter().flatten().for_each(|&vertex| is_fixed[vertex as usize] = true);
+        let mut smoothed = patch.clone();
+        smooth(&mut smoothed, &cones, step, &is_fixed);
         // New vertices are numbered from the mesh's own on.
         let first = self.mesh.unique() as u32;
-        let positions: Vec<Vec3> = patch.positions.iter().map(|&position| position + self.plan.origin).collect();
-        let position = |vertex: u32| match vertex.checked_sub(first) {
+        let patch_rim = patch_rim.numbered_from(first);
+        let place = |outline: &Outline| -> Vec<Vec3> {
+            outline.positions.iter().map(|&position| position + self.plan.origin).collect()
+        };
+        let mut positions = place(&smoothed);
+        let position = |positions: &[Vec3], vertex: u32| match vertex.checked_sub(first) {
             None => self.mesh.positions[vertex as usize],
             Some(new) => positions[new as usize],
         };
-        let patch_rim = patch_rim.numbered_from(first);
-        let numbers = rim.matched(&patch_rim, position)?;
+        let numbers = rim.matched(&patch_rim, |vertex| position(&positions, vertex))?;
         let mut triangles: Vec<[u32; 3]> =
             patch.triangles.iter().map(|triangle| triangle.map(|vertex| first + vertex)).collect();
         for (outer, &inner) in rim.loops.iter().zip(&numbers) {
-            belt([outer, &patch_rim.loops[inner]], position, &mut triangles);
+            belt([outer, &patch_rim.loops[inner]], |vertex| position(&positions, vertex), &mut triangles);
         }
         // With the faces that stay around it.
         let mut all = triangles.clone();
@@ -125,7 +133,14 @@ impl Site<'_> {
         let stays = |face: &u32| faces.binary_search(face).is_err();
         let is_beside = |face: &u32| self.corners(*face).iter().any(|vertex| edge.binary_search(vertex).is_ok());
         all.extend(near.iter().filter(|face| stays(face) && is_beside(face)).flat_map(|&face| self.triangles(face)));
-        (!any_meet(&all, position)).then_some(Graft { faces, positions, triangles, cones })
+        if any_meet(&all, |vertex| position(&positions, vertex)) {
+            // In a narrow crease, smoothing may push one side through the other.
+            positions = place(&patch);
+            if any_meet(&all, |vertex| position(&positions, vertex)) {
+                return None;
+            }
+        }
+        Some(Graft { faces, positions, triangles, cones })
     }
 }
 

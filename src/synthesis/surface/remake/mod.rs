@@ -14,6 +14,7 @@ mod mend;
 mod patch;
 mod plan;
 mod site;
+mod smooth;
 mod tubes;
 
 use super::mesh::SurfaceMesh;

@@ -113,7 +113,15 @@ impl Rim {
             }
             numbers.push(nearest);
         }
-        Some(numbers)
+        (self.closed_pieces() == other.closed_pieces()).then_some(numbers)
+    }
+
+    /// V − E + F of pieces without an open edge, in order.
+    fn closed_pieces(&self) -> Vec<i64> {
+        let is_closed = |piece: &usize| !self.pieces.contains(piece);
+        let mut euler: Vec<i64> = (0..self.euler.len()).filter(is_closed).map(|piece| self.euler[piece]).collect();
+        euler.sort_unstable();
+        euler
     }
 }
 
@@ -271,6 +279,17 @@ mod tests {
         let disc = [[0u32, 1, 2], [0, 2, 3]];
         let rim = Rim::of(disc.iter().map(|face| &face[..])).unwrap();
         assert_eq!((rim.loops, &rim.euler[..]), (vec![vec![0, 1, 2, 3]], &[1][..]));
+        let tetrahedron = [[0u32, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+        let ball = Rim::of(tetrahedron.iter().map(|face| &face[..])).unwrap();
+        assert_eq!((ball.loops.len(), ball.closed_pieces()), (0, vec![2]));
+        // A closed piece with a handle cannot take its place: seven vertices, each joined with all others.
+        let torus =
+            (0..7u32).flat_map(|at| [[at, at + 1, at + 3], [at, at + 3, at + 2]]).map(|face| face.map(|at| at % 7));
+        let torus: Vec<[u32; 3]> = torus.collect();
+        let torus = Rim::of(torus.iter().map(|face| &face[..])).unwrap();
+        assert_eq!((torus.loops.len(), torus.closed_pieces()), (0, vec![0]));
+        assert_eq!(ball.matched(&torus, |_| Vec3::ZERO), None);
+        assert_eq!(ball.matched(&ball, |_| Vec3::ZERO), Some(Vec::new()));
         let touching = [[0u32, 1, 2], [0, 3, 4]];
         assert!(Rim::of(touching.iter().map(|face| &face[..])).is_none());
         let two = [[0u32, 1, 2], [3, 4, 5]];

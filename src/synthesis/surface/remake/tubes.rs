@@ -1,6 +1,7 @@
 //! Tubes: the round cones along a part of a trunk's curve, and the distance to their union.
 
-use crate::synthesis::surface::curve::{Curve, Station};
+use crate::synthesis::surface::curve::Curve;
+use crate::synthesis::surface::spline::Station;
 use bevy_math::Vec3;
 use std::ops::Range;
 
