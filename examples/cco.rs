@@ -1,7 +1,8 @@
 //! Both generators in the same procedural liver: on the left arteries and veins by space colonization, on the right its
 //! four trees of least volume by constrained constructive optimisation, which never touch.
 //!
-//! Keys as on the screen. `--headless --out DIR` writes `cco.png` with both livers and `cco_liver.png` of the right one.
+//! Keys as on the screen. `--headless --out DIR` writes `cco.png` with both livers and `cco_liver.png` of the right
+//! one.
 
 mod common;
 

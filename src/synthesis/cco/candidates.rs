@@ -6,8 +6,8 @@
 //! best place is searched for, and room looked for, in the order of bounds and costs, until one candidate is connected:
 //! the same choice (branch and bound).
 //!
-//! Ranking changes nothing, so that several terminals are ranked at a time. If a segment has changed until its terminal's
-//! turn comes, the terminal is ranked anew.
+//! Ranking changes nothing, so that several terminals are ranked at a time. If a segment has changed until its
+//! terminal's turn comes, the terminal is ranked anew.
 
 use super::{
     distance::squared_to_segment,

@@ -14,14 +14,15 @@ use bevy_math::{DMat3, DVec3};
 
 /// Most steps of the search. Newton's method takes three to five.
 const MOST_STEPS: usize = 100;
-/// Length of a segment, as a share of the longest, below which the best place may be its end itself, where the volume has
-/// a cusp that steps approach slowly.
+/// Length of a segment, as a share of the longest, below which the best place may be its end itself, where the volume
+/// has a cusp that steps approach slowly.
 const NEAR_END: f64 = 0.15;
 /// The same below which a joint counts as at an end.
 const AT_END: f64 = 2.0e-3;
 /// Steps at an end after which the search is over.
 const STEPS_AT_END: usize = 10;
-/// Share of the pull of an end that leaves no doubt: pulls change with lengths, so there may be a better place beside it.
+/// Share of the pull of an end that leaves no doubt: pulls change with lengths, so there may be a better place beside
+/// it.
 const CLEARLY: f64 = 0.95;
 /// Halvings of a step that does not lower the volume.
 const HALVINGS: usize = 12;

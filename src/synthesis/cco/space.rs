@@ -27,8 +27,8 @@ pub(super) struct Space {
     pub given: u32,
     /// Factor of the radii for which new segments must have room: what they are expected to grow by.
     pub reserve: f64,
-    /// The last segment that had to become wider and had no room, of those before a change, and the segment beside it that
-    /// was in the way; itself where that was the border.
+    /// The last segment that had to become wider and had no room, of those before a change, and the segment beside it
+    /// that was in the way; itself where that was the border.
     pub blocked: Option<[u32; 2]>,
     /// The segment that was in the way of the last one without room; itself where that was the border.
     pub in_the_way: u32,

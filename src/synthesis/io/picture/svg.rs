@@ -18,8 +18,8 @@ pub fn save_svg(path: impl AsRef<Path>, trees: &[(VesselKind, &VesselTree)]) -> 
     write_atomically(path, |out| write_svg(out, trees))
 }
 
-/// Writes one or more trees as SVG 1.1: a line as wide as the vessel for each segment, seen along the z axis from above,
-/// the lowest first.
+/// Writes one or more trees as SVG 1.1: a line as wide as the vessel for each segment, seen along the z axis from
+/// above, the lowest first.
 ///
 /// The longer side of the picture is 512 points. Arteries are red, veins blue, portal veins violet, ducts green.
 ///

@@ -1,5 +1,5 @@
-//! GXL, the XML for graphs, in the dialect of OpenCCO and `VascuSynth`: a node for each node of the tree, an edge for each
-//! segment.
+//! GXL, the XML for graphs, in the dialect of OpenCCO and `VascuSynth`: a node for each node of the tree, an edge for
+//! each segment.
 //!
 //! Source: Winter, Kullbach & Riediger, "An Overview of the GXL Graph Exchange Language" (2002); the dialect is that of
 //! the files that OpenCCO (Kerautret et al., IPOL 2023) writes, with its leading spaces in names and values.
@@ -55,8 +55,8 @@ pub fn save_gxl(path: impl AsRef<Path>, tree: &VesselTree, options: &GxlOptions)
 /// - The graph has the pressures at the root, ` pPerf`, and at the terminals, ` pTerm`, in pascals.
 /// - Node `n0`, `n1` … is the tree's node of that number, with its type, ` root node `, ` terminal node ` or
 ///   ` bifurication ` (so spelled; that of any other node), and its position in mm.
-/// - Edge `e1`, `e2` … leads to the node of that number, with its flow in mm³/s, its radius in mm, and the reduced resistance of
-///   the segment with all below it (Eq. 6) in Pa·s·mm.
+/// - Edge `e1`, `e2` … leads to the node of that number, with its flow in mm³/s, its radius in mm, and the reduced
+///   resistance of the segment with all below it (Eq. 6) in Pa·s·mm.
 ///
 /// # Errors
 /// Those of `out`.
