@@ -22,6 +22,11 @@ const APART: f64 = 1.0 + 2.0e-6;
 /// Least length of a new segment, in radii.
 const LEAST_LENGTH: f64 = 2.0;
 
+/// A bound in f32 that is no larger, so that it never takes what it was not given; [`APART`] leaves room for that.
+fn rounded_down(bound: f64) -> f32 {
+    (bound * (1.0 - 1.0e-7)) as f32
+}
+
 impl Space {
     /// Whether the segments of a change, which are in the index, and all others whose radii it changed have room. If
     /// so, all bounds and strains are up to date.
@@ -126,13 +131,13 @@ impl Space {
             }
             // Half of the room for each, but no bound becomes wider.
             let other_bound = (APART * other_radius + 0.5 * spare).min(node.bound.into());
-            tightened.push((other, other_bound as f32));
-            bound = bound.min(distance - other_bound);
+            let other_bound = rounded_down(other_bound);
+            tightened.push((other, other_bound));
+            bound = bound.min(distance - f64::from(other_bound));
             true
         });
         if has_room {
-            // Rounded down, so that a bound never takes what it was not given; APART leaves room for that.
-            self.change(segment).bound = (bound * (1.0 - 1.0e-7)) as f32;
+            self.change(segment).bound = rounded_down(bound);
             self.index.refit(&self.forest, segment);
             for &(other, bound) in &tightened {
                 let node = self.change(other);
