@@ -97,7 +97,7 @@ fn the_kidneys_trunk_enters_at_the_hilum() {
         let data = SourceData { mesh: Some(Arc::clone(&mesh)), ..SourceData::default() };
         let prepared = preset.tissue.prepare(&data).unwrap_or_else(|error| panic!("{error}"));
         let tissue = prepared.tissue();
-        let spacing = preset.generator_for(tissue.extent()).root_spacing();
+        let spacing = preset.generator_for(tissue.extent()).root_spacing(tissue.extent());
         for seed in 0..8 {
             let roots = preset.roots().resolve(&**tissue, &spacing, seed).unwrap_or_else(|error| panic!("{error}"));
             // The kidney is in metres, the artery in millimetres.

@@ -228,6 +228,14 @@ pub enum Format {
     Obj,
     /// A table of segments.
     Csv,
+    /// Diameters by level, in mm if the method has a physical size.
+    Levels,
+    /// A graph as OpenCCO writes it, a file for each kind of vessels.
+    Gxl,
+    /// A picture of lines, for web pages.
+    Svg,
+    /// The same for papers.
+    Eps,
     /// Closed meshes, as binary glTF.
     Glb,
     /// Closed meshes, as binary STL.
@@ -246,7 +254,10 @@ impl Format {
         match self {
             Self::Swc => "swc",
             Self::Obj | Self::ObjMesh => "obj",
-            Self::Csv => "csv",
+            Self::Csv | Self::Levels => "csv",
+            Self::Gxl => "gxl",
+            Self::Svg => "svg",
+            Self::Eps => "eps",
             Self::Glb => "glb",
             Self::Stl => "stl",
             Self::Ply => "ply",

@@ -5,13 +5,15 @@ use super::mesh::{Meshed, meshes, save};
 use super::report::{CcoFigures, KindMeasures, Line};
 use super::{Failure, Format, Job, Unit};
 use bevy_vessels::synthesis::{
-    cco::Cco,
+    cco::{Cco, VesselFlow},
     growth::{Growth, StepCount},
     haemodynamics::Network,
     io::{
-        CsvOptions, ObjOptions, SwcOptions, WriteError, save_csv, save_obj, save_swc, swc_structure, write_atomically,
+        CsvOptions, GxlOptions, ObjOptions, SwcOptions, WriteError, save_csv, save_eps, save_gxl, save_levels,
+        save_obj, save_svg, save_swc, swc_structure, write_atomically,
     },
     roots::Roots,
+    tissue::Extent,
     tree::{ByKind, VesselKind, VesselTree, hash_trees},
 };
 use std::any::Any;
@@ -94,7 +96,9 @@ impl<'a> Grower<'a> {
             cco: CcoFigures::of(growth),
             files: Vec::new(),
         };
-        Written { job: self.job, trees: &trees, meshes: &meshes, flows: &flows, seed, hash }.write(&mut line)?;
+        let millimetres = (growth as &dyn Any).downcast_ref::<Cco>().map_or(1.0, Cco::millimetres);
+        let (job, trees, meshes, flows) = (self.job, &trees, &meshes, &flows);
+        Written { job, trees, meshes, flows, millimetres, seed, hash }.write(&mut line)?;
         Ok(Outcome { json: line.json(), line, was_there: false })
     }
 
@@ -137,7 +141,12 @@ fn targets(job: &Job, seed: u64, kinds: &[VesselKind]) -> Vec<Target> {
     let organ = job.run.organ(seed);
     let target = |format, kind, ending: String| Target { format, kind, path: folder.join(organ.clone() + &ending) };
     let files = job.formats.iter().flat_map(|&format| match format {
-        Format::Swc => kinds.iter().map(|&kind| target(format, Some(kind), format!("_{}.swc", kind.name()))).collect(),
+        Format::Swc | Format::Gxl => {
+            let ending = |kind: VesselKind| format!("_{}.{}", kind.name(), format.extension());
+            kinds.iter().map(|&kind| target(format, Some(kind), ending(kind))).collect()
+        }
+        // The other table has the plain name.
+        Format::Levels => vec![target(format, None, "_levels.csv".to_owned())],
         // The other OBJ file has the plain name.
         Format::ObjMesh => vec![target(format, None, "_mesh.obj".to_owned())],
         other => vec![target(other, None, format!(".{}", other.extension()))],
@@ -172,6 +181,8 @@ struct Written<'a> {
     trees: &'a [(VesselKind, &'a VesselTree)],
     meshes: &'a ByKind<Option<Meshed>>,
     flows: &'a ByKind<Option<Network>>,
+    /// Millimetres of a tissue length, where the method knows it.
+    millimetres: f64,
     seed: u64,
     hash: u64,
 }
@@ -207,9 +218,33 @@ impl Written<'_> {
             Format::Csv => {
                 save_csv(path, self.trees, &CsvOptions { flows: self.flows.as_ref().map(|_, of| of.as_ref()) })
             }
+            Format::Levels => save_levels(path, self.trees, self.millimetres),
+            Format::Gxl => {
+                let own = |(tree_kind, _): &&(VesselKind, &VesselTree)| Some(*tree_kind) == *kind;
+                self.trees
+                    .iter()
+                    .find(own)
+                    .map_or(Ok(()), |&(kind, tree)| save_gxl(path, tree, &self.gxl_options(kind, tree)))
+            }
+            Format::Svg => save_svg(path, self.trees),
+            Format::Eps => save_eps(path, self.trees),
             Format::Glb | Format::Stl | Format::Ply | Format::Off | Format::ObjMesh => {
                 save(path, self.meshes, scale, comments)
             }
         }
     }
+
+    fn gxl_options(&self, kind: VesselKind, tree: &VesselTree) -> GxlOptions {
+        let (job, flows) = (self.job, self.job.generator.cco().map(|settings| &settings.flow));
+        GxlOptions {
+            name: format!("{}_{}", job.run.organ(self.seed), kind.name()),
+            flow: flows.map_or_else(VesselFlow::default, |flow| flow[kind]),
+            millimetres: self.millimetres,
+            is_flat: matches!(job.tissue.extent(), Extent::Area(_)) && has_one_height(tree),
+        }
+    }
+}
+
+fn has_one_height(tree: &VesselTree) -> bool {
+    tree.positions().iter().all(|position| position.z == tree.positions()[0].z)
 }

@@ -1,7 +1,10 @@
 //! Constrained constructive optimisation: what every tree must be, in comparison with plain computations and with what
 //! OpenCCO gives.
 
+mod beyond;
+mod files;
 mod oracle;
+mod organs;
 mod quality;
 mod requests;
 

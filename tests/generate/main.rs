@@ -372,6 +372,48 @@ fn wrong_usage_is_named_with_exit_code_2() {
 }
 
 #[test]
+fn least_volume_is_a_method_with_figures_and_files_of_its_own() {
+    let folder = Folder::new("cco");
+    let out = folder.path("out");
+    let formats = "--format=gxl,svg,eps,levels";
+    let text =
+        run(&["--method=cco", "--tissue=ball", "--terminals=40", "--json", "--out", &out, formats]).expect("a tree");
+    let line: Value = serde_json::from_str(&text).expect("a line of JSON");
+    assert_eq!(line["preset"], "cco-ball");
+    let cco = &line["cco"];
+    assert_eq!((&cco["terminals"], &cco["overlaps"]), (&40.into(), &0.into()));
+    assert!(cco["volume"].as_f64().is_some_and(|volume| volume > 0.0) && cco["rejected"].is_u64());
+    assert!(cco["root_radius"].as_f64().is_some_and(|radius| (0.5..2.0).contains(&radius)), "in mm");
+    assert_eq!((&line["arterial"]["leaves"], &line["venous"]), (&40.into(), &Value::Null));
+    let files: Vec<&str> = line["files"].as_array().expect("files").iter().filter_map(Value::as_str).collect();
+    let endings = ["_levels.csv", "_arterial.gxl", ".svg", ".eps"];
+    assert!(
+        files.iter().zip(endings).all(|(file, ending)| file.ends_with(ending) && Path::new(file).exists()),
+        "{files:?}"
+    );
+    assert!(generate(&[]).iter().all(|line| line["cco"].is_null()), "figures of another method");
+
+    let code = |arguments: &[&str]| match run(arguments) {
+        Err(failure) => (failure.exit_code(), failure.to_string()),
+        Ok(text) => panic!("{arguments:?}: {text}"),
+    };
+    for (arguments, expected, named) in [
+        (&["--method=cco", "--preset=paper"][..], 2, "--method cco conflicts with paper"),
+        (&["--method=colonization", "--preset=cco-disc"], 2, "conflicts with cco-disc"),
+        (&["--terminals=9"], 2, "--terminals is for --method cco"),
+        (&["--method=cco", "--steps=9"], 2, "--steps is for space colonization"),
+        (&["--method=cco", "--terminals=0"], 2, "terminals is 0; it must be from 1 to"),
+        (&["--method=cco", "--set=flow.artery.rate=(0.0)"], 2, "rate, in m³/s, of the arterial vessels is 0"),
+        (&["--method=cco", "--set=roots.artery=Exact([(9, 9, 9)])"], 1, "disc with seed 1: "),
+        (&["--method=cco", "--tissue=ball", "--set=perfusion=150", "--terminals=900"], 1, " of 900 arterial terminals"),
+    ] {
+        let (found, message) = code(arguments);
+        assert_eq!(found, expected, "{arguments:?}: {message}");
+        assert!(message.contains(named), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
 fn what_goes_wrong_is_named_with_exit_code_1_and_leaves_nothing_half_done() {
     let folder = Folder::new("failures");
     let (file, bad) = (folder.path("file"), folder.path("bad.ron"));

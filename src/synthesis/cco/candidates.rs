@@ -5,6 +5,9 @@
 //! candidate, and tests it for intersections. Here each gets a lower bound of its cost first, from one look at it. The
 //! best place is searched for, and room looked for, in the order of bounds and costs, until one candidate is connected:
 //! the same choice (branch and bound).
+//!
+//! Ranking changes nothing, so that several terminals are ranked at a time. If a segment has changed until its
+//! terminal's turn comes, the terminal is ranked anew.
 
 use super::{
     distance::squared_to_segment,
@@ -25,6 +28,8 @@ const PROMISE: f64 = 4.0;
 pub(super) struct Candidate {
     /// The segment to be split.
     pub segment: u32,
+    /// Its ends.
+    pub ends: [DVec3; 2],
     /// Where it is split.
     pub place: DVec3,
     /// Volume that it adds, over π and the square of the radius of a load of 1.
@@ -44,18 +49,16 @@ pub(super) struct Guess {
 
 /// What is known of a candidate.
 #[derive(Clone, Copy, Debug)]
-enum Rank {
-    Guessed(Guess),
-    Known(Candidate),
+struct Rank {
+    guess: Guess,
+    /// Its best place, once that has been searched for.
+    known: Option<Candidate>,
 }
 
 impl Rank {
     /// The least cost that it may have, and its segment, which decides between equals.
     fn key(&self) -> (f64, u32) {
-        match self {
-            Self::Guessed(guess) => (guess.bound, guess.segment),
-            Self::Known(candidate) => (candidate.cost, candidate.segment),
-        }
+        (self.known.map_or(self.guess.bound, |known| known.cost), self.guess.segment)
     }
 }
 
@@ -67,6 +70,8 @@ pub(super) struct Candidates {
     found: Vec<(f64, u32)>,
     ranks: Vec<Rank>,
     paths: Paths,
+    /// Whether no segment is left, or the point is within a vessel.
+    is_hopeless: bool,
 }
 
 /// How an attempt to connect a terminal ended.
@@ -77,6 +82,8 @@ pub(super) enum Attempt {
     Failed,
     /// No segment is left, or the place is within a vessel.
     Hopeless,
+    /// A segment has changed since it was ranked.
+    Outdated,
 }
 
 impl Candidates {
@@ -112,52 +119,67 @@ impl Candidates {
         self.found.truncate(count);
     }
 
-    /// Bytes of memory.
-    pub(super) fn bytes(&self) -> usize {
-        self.paths.bytes()
-    }
-
-    /// Connects a point to the best of its `count` nearest segments that has room. The first `known` have none.
-    pub(super) fn connect(
+    /// Ranks a point's `count` nearest segments, without the first `known`, up to the best of them. Nothing is changed,
+    /// so it may be done for several points at a time.
+    pub(super) fn rank(
         &mut self,
-        space: &mut Space,
+        space: &Space,
         point: DVec3,
         [known, count]: [usize; 2],
         tolerance: f64,
         may_join: impl Fn(u32) -> bool,
-    ) -> Attempt {
+    ) {
         self.nearest(space, point, count, may_join);
         let is_within = |&(square, segment): &(f64, u32)| {
             let bound = f64::from(space.forest.node(segment).bound);
             square < bound * bound && square.sqrt() < space.radius(segment)
         };
-        if self.found.len() <= known || known == 0 && self.found.iter().any(is_within) {
+        self.ranks.clear();
+        self.is_hopeless = self.found.len() <= known || known == 0 && self.found.iter().any(is_within);
+        if self.is_hopeless {
+            return;
+        }
+        self.paths.clear();
+        for &(_, segment) in &self.found[known..] {
+            self.ranks.push(Rank { guess: space.guess(segment, point, &mut self.paths), known: None });
+        }
+        self.best(space, tolerance);
+    }
+
+    /// Connects a point to the best of the segments that were [ranked](Self::rank) for it and have room.
+    pub(super) fn connect(&mut self, space: &mut Space, point: DVec3, tolerance: f64) -> Attempt {
+        if self.is_hopeless {
             return Attempt::Hopeless;
         }
-        self.ranks.clear();
-        self.paths.clear(&space.forest);
-        for &(_, segment) in &self.found[known..] {
-            self.ranks.push(Rank::Guessed(space.guess(segment, point, &mut self.paths)));
-        }
-        // The least bound or cost comes next: a cost below all bounds is the least cost.
-        while let Some(best) = (0..self.ranks.len()).min_by(|&a, &b| {
-            let (a, b) = (self.ranks[a].key(), self.ranks[b].key());
-            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
-        }) {
-            match self.ranks[best] {
-                Rank::Guessed(guess) => match space.search(&guess, tolerance) {
-                    Some(candidate) => self.ranks[best] = Rank::Known(candidate),
-                    None => drop(self.ranks.swap_remove(best)),
-                },
-                Rank::Known(candidate) => {
-                    if space.connect(&candidate, point) {
-                        return Attempt::Connected;
-                    }
-                    self.ranks.swap_remove(best);
-                }
+        while let Some((rank, best)) = self.best(space, tolerance) {
+            if !space.is_there(best.segment, best.ends) {
+                return Attempt::Outdated;
             }
+            if space.connect(&best, point) {
+                return Attempt::Connected;
+            }
+            self.ranks.swap_remove(rank);
         }
         Attempt::Failed
+    }
+
+    /// The candidate with the least cost, and its rank. The least bound or cost comes next: a cost below all bounds is
+    /// the least cost.
+    fn best(&mut self, space: &Space, tolerance: f64) -> Option<(usize, Candidate)> {
+        loop {
+            let best = (0..self.ranks.len()).min_by(|&a, &b| {
+                let (a, b) = (self.ranks[a].key(), self.ranks[b].key());
+                a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+            })?;
+            let rank = &mut self.ranks[best];
+            if let Some(known) = rank.known {
+                return Some((best, known));
+            }
+            rank.known = space.search(&rank.guess, tolerance);
+            if rank.known.is_none() {
+                self.ranks.swap_remove(best);
+            }
+        }
     }
 }
 
@@ -195,7 +217,13 @@ impl Space {
         let before = forest.node(self.root_segment(node.tree)).sums.volume;
         let cost = ascent.root.volume - before;
         let are_long = [trunk, child(0), child(1)].into_iter().zip(sums.lengths).all(is_long);
-        (are_long && cost.is_finite()).then_some(Candidate { segment: *segment, place, cost })
+        let ends = [joint.ends[0], joint.ends[1]];
+        (are_long && cost.is_finite()).then_some(Candidate { segment: *segment, ends, place, cost })
+    }
+
+    /// Whether a segment has these ends.
+    fn is_there(&self, segment: u32, ends: [DVec3; 2]) -> bool {
+        [self.forest.node(segment).parent, segment].map(|node| self.forest.place(node)) == ends
     }
 
     /// Connects a terminal as a candidate says, if there is room; otherwise nothing is changed.

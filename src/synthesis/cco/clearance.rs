@@ -22,6 +22,11 @@ const APART: f64 = 1.0 + 2.0e-6;
 /// Least length of a new segment, in radii.
 const LEAST_LENGTH: f64 = 2.0;
 
+/// A bound in f32 that is no larger, so that it never takes what it was not given; [`APART`] leaves room for that.
+fn rounded_down(bound: f64) -> f32 {
+    (bound * (1.0 - 1.0e-7)) as f32
+}
+
 impl Space {
     /// Whether the segments of a change, which are in the index, and all others whose radii it changed have room. If
     /// so, all bounds and strains are up to date.
@@ -74,7 +79,7 @@ impl Space {
             if fits {
                 self.strain_from(segment);
             } else {
-                self.blocked = Some(segment);
+                self.blocked = Some([segment, self.in_the_way]);
             }
             fits
         });
@@ -85,6 +90,7 @@ impl Space {
     /// Finds a bound for a segment, drawing in those of its neighbours if need be; `false` if there is no room for
     /// radii that are `reserve` times as wide.
     pub(super) fn clear(&mut self, segment: u32, reserve: f64) -> bool {
+        self.in_the_way = segment;
         let radius = self.radius(segment);
         let parent = self.forest.node(segment).parent;
         let ends = [self.forest.place(parent), self.forest.place(segment)];
@@ -99,7 +105,7 @@ impl Space {
         }
         let mut tightened = std::mem::take(&mut self.tightened);
         tightened.clear();
-        let mut has_room = true;
+        let (mut has_room, mut in_the_way) = (true, segment);
         let (middle, half) = (ends[0].midpoint(ends[1]), 0.5 * ends[0].distance(ends[1]));
         self.index.near(ends[0], ends[1], bound, |other| {
             let node = self.forest.node(other);
@@ -120,18 +126,18 @@ impl Space {
             let (distance, other_radius) = (square.sqrt(), self.radius(other));
             let spare = distance - APART * (radius + other_radius);
             if spare < 0.0 || distance < reserve * (radius + other_radius) {
-                has_room = false;
+                (has_room, in_the_way) = (false, other);
                 return false;
             }
             // Half of the room for each, but no bound becomes wider.
             let other_bound = (APART * other_radius + 0.5 * spare).min(node.bound.into());
-            tightened.push((other, other_bound as f32));
-            bound = bound.min(distance - other_bound);
+            let other_bound = rounded_down(other_bound);
+            tightened.push((other, other_bound));
+            bound = bound.min(distance - f64::from(other_bound));
             true
         });
         if has_room {
-            // Rounded down, so that a bound never takes what it was not given; APART leaves room for that.
-            self.change(segment).bound = (bound * (1.0 - 1.0e-7)) as f32;
+            self.change(segment).bound = rounded_down(bound);
             self.index.refit(&self.forest, segment);
             for &(other, bound) in &tightened {
                 let node = self.change(other);
@@ -140,6 +146,7 @@ impl Space {
             }
         }
         self.tightened = tightened;
+        self.in_the_way = in_the_way;
         has_room
     }
 

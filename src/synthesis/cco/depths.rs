@@ -55,9 +55,8 @@ impl Depths {
 
     /// Whether the depth of a point may be so large.
     pub(super) fn may_be_above(&self, tissue: &dyn Tissue, point: Vec3, depth: f64) -> bool {
-        let [least, most] = match self.coarse.bounds(tissue, point) {
-            Some(bounds) => bounds,
-            None => return tissue.depth(point).is_some_and(|found| f64::from(found) >= depth),
+        let Some([least, most]) = self.coarse.bounds(tissue, point) else {
+            return tissue.depth(point).is_some_and(|found| f64::from(found) >= depth);
         };
         least >= depth || most >= depth && self.fine.bounds(tissue, point).is_none_or(|[_, most]| most >= depth)
     }

@@ -1,7 +1,7 @@
 //! The tissue as a domain: how deep a point lies, and whether a segment stays inside.
 //!
-//! Depths of a mesh are searched for, so the domain keeps some of them, which bound all others. Only where the bounds do
-//! not decide, near the border, the mesh is asked.
+//! Depths of a mesh are searched for, so the domain keeps some of them, which bound all others. Only where the bounds
+//! do not decide, near the border, the mesh is asked.
 
 use super::depths::Depths;
 use super::{error::CcoError, power::cube_root, settings::CcoSettings};

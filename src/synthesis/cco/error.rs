@@ -40,8 +40,8 @@ pub enum CcoSettingsError {
     },
     /// Pressures between which nothing flows.
     #[error(
-        "root_pressure of the {} vessels is {root} Pa and terminal_pressure {terminal} Pa; the root's must be above the \
-         terminals'",
+        "root_pressure of the {} vessels is {root} Pa and terminal_pressure {terminal} Pa; the root's must be above \
+         the terminals'",
         kind.name()
     )]
     Pressures {
@@ -65,8 +65,8 @@ pub enum GivenTreeError {
     },
     /// More children than this generator knows.
     #[error(
-        "has more than {most} children; vessels must bifurcate, and a root must have one child: divide it in two nodes, or \
-         give each root vessel its own root"
+        "has more than {most} children; vessels must bifurcate, and a root must have one child: divide it in two \
+         nodes, or give each root vessel its own root"
     )]
     TooManyChildren {
         /// Most children that it may have.
@@ -80,8 +80,8 @@ pub enum GivenTreeError {
     NoLength,
     /// A vessel that overlaps another one.
     #[error(
-        "ends a vessel that overlaps another one at a radius of {radius} tissue lengths; raise perfusion, lower the flow \
-         or move it"
+        "ends a vessel that overlaps another one at a radius of {radius} tissue lengths; raise perfusion, lower the \
+         flow or move it"
     )]
     Overlaps {
         /// The radius that it would have.
@@ -122,7 +122,8 @@ pub enum CcoError {
     },
     /// Fewer terminals than roots.
     #[error(
-        "{terminals} terminals are too few for the {} vessels, whose roots and given trees need {needed}; raise terminals",
+        "{terminals} terminals are too few for the {} vessels, whose roots and given trees need {needed}; \
+         raise terminals",
         kind.name()
     )]
     TooFewTerminals {

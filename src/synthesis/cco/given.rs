@@ -1,6 +1,7 @@
 //! Trees from which a growth continues.
 //!
-//! Their centre lines stay as they are, even outside the tissue. Radii follow from the flow, as those of all vessels do.
+//! Their centre lines stay as they are, even outside the tissue. Radii follow from the flow, as those of all vessels
+//! do.
 
 use super::{
     error::{CcoError, GivenTreeError},
@@ -11,8 +12,8 @@ use super::{
 use crate::synthesis::tree::{NO_PARENT, VesselKind, VesselTree};
 
 impl Space {
-    /// Takes over a given tree, or forest, whose terminals have the flows that `share` gives. Returns the numbers of its
-    /// trees and its terminal nodes.
+    /// Takes over a given tree, or forest, whose terminals have the flows that `share` gives. Returns the numbers of
+    /// its trees and its terminal nodes.
     ///
     /// # Errors
     /// A tree that is no binary one, whose root has other than one child, or whose vessels overlap.

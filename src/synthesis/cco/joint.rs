@@ -14,9 +14,16 @@ use bevy_math::{DMat3, DVec3};
 
 /// Most steps of the search. Newton's method takes three to five.
 const MOST_STEPS: usize = 100;
-/// Length of a segment, as a share of the longest, below which the best place may be its end itself, where the volume has
-/// a cusp that steps approach slowly.
+/// Length of a segment, as a share of the longest, below which the best place may be its end itself, where the volume
+/// has a cusp that steps approach slowly.
 const NEAR_END: f64 = 0.15;
+/// The same below which a joint counts as at an end.
+const AT_END: f64 = 2.0e-3;
+/// Steps at an end after which the search is over.
+const STEPS_AT_END: usize = 10;
+/// Share of the pull of an end that leaves no doubt: pulls change with lengths, so there may be a better place beside
+/// it.
+const CLEARLY: f64 = 0.95;
 /// Halvings of a step that does not lower the volume.
 const HALVINGS: usize = 12;
 /// Least length of a segment, as a share of the joint's size: a pull has no direction at its end.
@@ -90,7 +97,9 @@ impl Joint {
     pub(super) fn settle(&self, start: DVec3, at_start: &JointSums, slope: &Slope, tolerance: f64) -> DVec3 {
         let cost = |sums: &JointSums| slope.load * sums.trunk.load + slope.volume * sums.trunk.volume;
         let (mut place, mut sums) = (start, *at_start);
-        let (mut least, mut is_tested) = (cost(&sums), [false; 3]);
+        let (mut least, mut steps_at_end) = (cost(&sums), 0);
+        // A segment without load pulls without limit at its end, which tells nothing.
+        let mut is_told = [false, self.below[0].load == 0.0, self.below[1].load == 0.0];
         for _ in 0..MOST_STEPS {
             let Some(Step { way, plain, gain, scale }) = self.step(place, &sums, slope) else { break };
             if gain <= tolerance * scale {
@@ -104,23 +113,26 @@ impl Joint {
             (place, sums, least) = (next, there, cost(&there));
             let longest = sums.lengths.into_iter().fold(0.0, f64::max);
             let is_near = |end: &usize| sums.lengths[*end] < NEAR_END * longest;
-            if let Some(end) = (0..3).find(is_near).filter(|&end| !std::mem::replace(&mut is_tested[end], true))
-                && self.rests_at(end, slope)
-            {
+            let Some(end) = (0..3).find(is_near) else { continue };
+            if !std::mem::replace(&mut is_told[end], true) && self.rests_at(end, slope) {
                 return self.ends[end];
+            }
+            steps_at_end += usize::from(sums.lengths[end] < AT_END * longest);
+            if steps_at_end > STEPS_AT_END {
+                break;
             }
         }
         place
     }
 
-    /// Whether the joint would stay at an end: the others pull no more than that end does.
+    /// Whether the joint would stay at an end: the others pull clearly less than that end does.
     fn rests_at(&self, end: usize, slope: &Slope) -> bool {
         let place = self.ends[end];
         let sums = self.sums(place);
         let pulls = self.pulls(&sums, slope);
         let others = (0..3).filter(|&other| other != end);
         let pull: DVec3 = others.map(|other| (self.ends[other] - place) * (pulls[other] / sums.lengths[other])).sum();
-        pull.length_squared() <= pulls[end] * pulls[end]
+        pull.length() <= CLEARLY * pulls[end]
     }
 
     /// What the first step of a search would gain.

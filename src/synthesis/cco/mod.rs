@@ -1,7 +1,8 @@
 //! Constrained constructive optimisation: trees of least volume, one terminal at a time.
 //!
 //! In: a tissue with a border, flat or solid, roots, [`CcoSettings`] and a seed. Out: a [`VesselTree`] for each kind of
-//! vessels that has a root. Source: Schreiner and Buxbaum 1993, Karch et al. 1999, in the form of OpenCCO (Kerautret et al., IPOL 2023).
+//! vessels that has a root. Source: Schreiner and Buxbaum 1993, Karch et al. 1999, in the form of OpenCCO (Kerautret et
+//! al., IPOL 2023).
 //!
 //! Every terminal has the same flow and pressure, so radii follow from the tree: they are those at which blood reaches
 //! all terminals with one loss of pressure, and obey Murray's law. To add a terminal,
@@ -11,8 +12,8 @@
 //! 3. the cheapest of them that has room is taken (`clearance`, `domain`).
 //!
 //! At the end, and whenever the number of terminals has doubled, all bifurcations are moved to the best place under the
-//! present flows (`polish`). In contrast to OpenCCO, no two segments of any trees overlap at any time, unless they share
-//! a node, and every segment keeps its whole width inside the tissue, except where a vessel enters at its root.
+//! present flows (`polish`). In contrast to OpenCCO, no two segments of any trees overlap at any time, unless they
+//! share a node, and every segment keeps its whole width inside the tissue, except where a vessel enters at its root.
 //!
 //! The domain grows with the number of terminals, as in section 3.3.1. Only radii depend on its size, by one common
 //! factor, so its growth moves nothing.
@@ -50,6 +51,7 @@ pub use settings::{CcoSettings, VesselFlow};
 
 use crate::synthesis::{
     growth::StepCount,
+    parallel,
     random::{Stream, VesselRng},
     roots::Roots,
     tissue::{Tissue, TissuePoint},
@@ -114,8 +116,8 @@ pub struct Cco {
 }
 
 impl Cco {
-    /// Prepares a growth with given trees and the first vessel of each root. Lengths in the settings are the tissue's: see
-    /// [`CcoSettings::fit`].
+    /// Prepares a growth with given trees and the first vessel of each root. Lengths in the settings are the tissue's:
+    /// see [`CcoSettings::fit`].
     ///
     /// # Errors
     /// A setting outside its limits; a tissue that is neither flat nor solid; roots that cannot be placed as requested,
@@ -240,9 +242,11 @@ impl Cco {
     /// # Errors
     /// [`CcoError::NoRoom`] if there was no room for all terminals. The trees with those that were placed stay.
     pub fn run(&mut self) -> Result<(), CcoError> {
-        while !self.is_finished() {
-            self.advance();
-        }
+        parallel::with_company(|| {
+            while !self.is_finished() {
+                self.advance();
+            }
+        });
         self.settle();
         self.outcome()
     }

@@ -24,7 +24,7 @@ struct Step {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Paths {
     steps: Vec<Step>,
-    /// For each segment, its step, if that has its number.
+    /// Numbers of the steps by the hash of their segment, in a table with a power of two of places; `NONE` is free.
     step_of: Vec<u32>,
     /// Buffer: the way of one candidate up to another's, with the slopes from its beginning.
     way: Vec<(u32, Sums, Slope)>,
@@ -32,15 +32,41 @@ pub(super) struct Paths {
 
 impl Paths {
     /// Forgets all ways, for another terminal.
-    pub(super) fn clear(&mut self, forest: &Forest) {
+    pub(super) fn clear(&mut self) {
         self.steps.clear();
-        if self.step_of.len() < forest.nodes.len() {
-            self.step_of.resize(forest.nodes.capacity(), 0);
+        self.step_of.fill(NONE);
+    }
+
+    /// The place of a segment's step in the table, or the free one where it belongs.
+    fn slot(&self, segment: u32) -> usize {
+        let mask = self.step_of.len() - 1;
+        // Fibonacci hashing.
+        let mut slot = segment.wrapping_mul(0x9E37_79B9) as usize >> 8 & mask;
+        while self.step_of[slot] != NONE && self.steps[self.step_of[slot] as usize].segment != segment {
+            slot = (slot + 1) & mask;
         }
+        slot
     }
 
     fn step(&self, segment: u32) -> Option<&Step> {
-        self.steps.get(self.step_of[segment as usize] as usize).filter(|step| step.segment == segment)
+        if self.steps.is_empty() {
+            return None;
+        }
+        self.steps.get(self.step_of[self.slot(segment)] as usize)
+    }
+
+    fn add(&mut self, step: Step) {
+        // Half full at most.
+        if 2 * self.steps.len() >= self.step_of.len() {
+            self.step_of = vec![NONE; (2 * self.step_of.len()).max(256)];
+            for number in 0..self.steps.len() {
+                let slot = self.slot(self.steps[number].segment);
+                self.step_of[slot] = number as u32;
+            }
+        }
+        let slot = self.slot(step.segment);
+        self.step_of[slot] = self.steps.len() as u32;
+        self.steps.push(step);
     }
 
     /// Volume of the tree if a segment, which gains so much flow, had other sums, and how it depends on them.
@@ -64,15 +90,10 @@ impl Paths {
             slope.rise(&sums, &below, &above);
             (segment, sums) = (parent, above);
         };
-        for &(segment, sums, below) in &self.way {
-            self.step_of[segment as usize] = self.steps.len() as u32;
-            self.steps.push(Step { segment, sums, volume, slope: whole.without(&below) });
+        for number in 0..self.way.len() {
+            let (segment, sums, below) = self.way[number];
+            self.add(Step { segment, sums, volume, slope: whole.without(&below) });
         }
         (volume, whole)
-    }
-
-    /// Bytes of memory.
-    pub(super) fn bytes(&self) -> usize {
-        4 * self.step_of.capacity()
     }
 }

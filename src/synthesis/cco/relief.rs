@@ -1,31 +1,42 @@
 //! Makes room around a vessel that is in the way of all those below it.
 //!
-//! A trunk becomes wider with each terminal below it. Once it touches a neighbour or the border, none of its subtree can
-//! grow on. Then its ends move a little to where there is room, and where that costs least volume.
+//! A trunk becomes wider with each terminal below it. Once it touches a neighbour or the border, none of its subtree
+//! can grow on. Then its ends move a little to where there is room, and where that costs least volume; or those of the
+//! neighbour do.
 
 use super::{forest::NONE, space::Space};
 use bevy_math::DVec3;
 
 /// How far a bifurcation moves, in radii of the vessel, tried in turn.
-const WAYS: [f64; 3] = [0.2, 0.5, 1.0];
-/// Room for growth that the vessel must have afterwards, as a factor of its radius.
-const ROOM: f64 = 1.1;
+const WAYS: [f64; 5] = [0.2, 0.5, 1.0, 2.0, 4.0];
+/// Room for growth that the vessel must have afterwards, as factors of its radius, tried in turn.
+const ROOMS: [f64; 2] = [1.1, 1.02];
 
 impl Space {
-    /// Moves an end of a segment so that it gets room to grow. Returns whether that was possible.
-    pub(super) fn relieve(&mut self, segment: u32) -> bool {
-        let parent = self.forest.node(segment).parent;
+    /// Moves an end of a segment, or of its neighbour, so that it gets room to grow. Returns whether that was possible.
+    pub(super) fn relieve(&mut self, [segment, neighbour]: [u32; 2]) -> bool {
+        let is_there = |node: &u32| (*node as usize) < self.forest.nodes.len();
+        if !is_there(&segment) {
+            return false;
+        }
+        let mut ends: Vec<u32> = Vec::with_capacity(4);
+        for node in [segment, neighbour].into_iter().filter(is_there) {
+            ends.extend([node, self.forest.node(node).parent].into_iter().filter(|end| *end != NONE));
+        }
+        ends.dedup();
         let step = self.radius(segment);
-        WAYS.into_iter().any(|way| [segment, parent].into_iter().any(|node| self.evade(node, way * step)))
+        let tries = ROOMS.into_iter().flat_map(|room| WAYS.map(|way| (room, way * step)));
+        let mut tries = tries.flat_map(|(room, way)| ends.iter().map(move |&end| (room, way, end)));
+        tries.any(|(room, way, end)| self.evade(end, way, room))
     }
 
     /// Moves a bifurcation by this way, in the direction of least volume of those in which there is room.
-    fn evade(&mut self, node: u32, way: f64) -> bool {
+    fn evade(&mut self, node: u32, way: f64, room: f64) -> bool {
         let own = *self.forest.node(node);
         if own.parent == NONE || own.children[1] == NONE || node < self.given {
             return false;
         }
-        let (reserve, mut best) = (std::mem::replace(&mut self.reserve, ROOM), None);
+        let (reserve, mut best) = (std::mem::replace(&mut self.reserve, room), None);
         for place in self.directions().map(|direction| (own.at.as_dvec3() + direction * way).as_vec3().as_dvec3()) {
             if self.try_shift(node, place) {
                 let volume = self.forest.node(self.root_segment(own.tree)).sums.volume;

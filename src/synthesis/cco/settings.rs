@@ -41,8 +41,8 @@ pub struct CcoSettings {
     ///
     /// Default: [`VesselFlow::default`] for all kinds.
     pub flow: ByKind<VesselFlow>,
-    /// Spread of the flows of the terminals, as a share of their mean: each has a flow from 1 − spread to 1 + spread times
-    /// the mean, at random.
+    /// Spread of the flows of the terminals, as a share of their mean: each has a flow from 1 − spread to 1 + spread
+    /// times the mean, at random.
     ///
     /// Higher values give terminals of more different widths. 0 gives all the same flow, as OpenCCO does.
     ///
@@ -52,8 +52,8 @@ pub struct CcoSettings {
     ///
     /// Units: tissue lengths. Limits: ≥ 0. Default: 0.
     pub border_distance: f32,
-    /// Number `N_con` of nearest segments to which a new terminal may be connected. It is doubled while none of them can
-    /// be, up to [`Self::MOST_DOUBLINGS`] times; then another place is drawn.
+    /// Number `N_con` of nearest segments to which a new terminal may be connected. It is doubled while none of them
+    /// can be, up to [`Self::MOST_DOUBLINGS`] times; then another place is drawn.
     ///
     /// Higher values compare more connections, and take longer.
     ///

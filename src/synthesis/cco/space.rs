@@ -27,8 +27,11 @@ pub(super) struct Space {
     pub given: u32,
     /// Factor of the radii for which new segments must have room: what they are expected to grow by.
     pub reserve: f64,
-    /// The last segment that had to become wider and had no room, of those before a change.
-    pub blocked: Option<u32>,
+    /// The last segment that had to become wider and had no room, of those before a change, and the segment beside it
+    /// that was in the way; itself where that was the border.
+    pub blocked: Option<[u32; 2]>,
+    /// The segment that was in the way of the last one without room; itself where that was the border.
+    pub in_the_way: u32,
     /// Nodes as they were before a change, in the order in which they were changed.
     pub(super) before: Vec<(u32, Node)>,
     /// Number of nodes before the change.
@@ -57,6 +60,7 @@ impl Space {
             given: 0,
             reserve: 1.0,
             blocked: None,
+            in_the_way: NONE,
             before: Vec::new(),
             nodes_before: 0,
             moved: Vec::new(),

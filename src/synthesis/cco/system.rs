@@ -10,6 +10,7 @@ use super::{
     vacancy::Vacancy,
 };
 use crate::synthesis::{
+    parallel,
     random::VesselRng,
     tree::{VesselKind, VesselTree},
 };
@@ -27,6 +28,26 @@ const FLOW_UNIT: f64 = 1.0 / 1_048_576.0;
 /// Places refused in a row after which a kind has no room for more.
 const MOST_REFUSED: u32 = 500;
 
+/// Refused terminals after which a segment that no move gave room is looked at again.
+const PATIENCE: u64 = 40;
+/// Terminals from which on several are ranked at a time: the trees then hardly change meanwhile.
+const FIRST_BATCH: u32 = 256;
+/// Terminals that are ranked at a time.
+const BATCH: usize = 8;
+
+/// A terminal to be connected.
+#[derive(Clone, Debug, Default)]
+struct Plan {
+    place: DVec3,
+    candidates: Candidates,
+}
+
+impl Plan {
+    fn rank(&mut self, space: &Space, trees: &[u32], range: [usize; 2], tolerance: f64) {
+        self.candidates.rank(space, self.place, range, tolerance, |tree| trees.contains(&tree));
+    }
+}
+
 /// The trees of one kind.
 #[derive(Clone, Debug)]
 pub(super) struct System {
@@ -39,11 +60,13 @@ pub(super) struct System {
     pub refused: u32,
     pub is_stuck: bool,
     vacancy: Vacancy,
-    candidates: Candidates,
+    /// The next terminals, the last of them first, and their number.
+    plans: Vec<Plan>,
+    planned: usize,
     /// Excess of the next terminal's flow over the mean, if that is decided, in units.
     excess: Option<f64>,
-    /// Segments that no move gives room.
-    stuck: Vec<u32>,
+    /// Segments that no move gave room, and the number of refused terminals then.
+    stuck: Vec<(u32, u64)>,
     /// 8µQ/(πk·ΔP·s³): the unit of a radius's fourth power once the domain has its full size.
     unit: f64,
 }
@@ -64,7 +87,8 @@ impl System {
             refused: 0,
             is_stuck: false,
             vacancy: Vacancy::new(domain, settings.terminals),
-            candidates: Candidates::default(),
+            plans: Vec::new(),
+            planned: 0,
             excess: None,
             stuck: Vec::new(),
             unit,
@@ -174,53 +198,91 @@ impl System {
         self.is_stuck || self.terminals >= settings.terminals
     }
 
-    /// Draws one place for a terminal and connects it, if that is possible. Returns whether it was.
+    /// Connects the next terminal, if that is possible. Returns whether it was.
     pub(super) fn advance(&mut self, space: &mut Space, settings: &CcoSettings, rng: &mut VesselRng) -> bool {
-        let Some(place) = self.vacancy.draw(&space.domain, 0.0, rng) else {
+        if self.planned == 0 && !self.plan(space, settings, rng) {
             self.is_stuck = true;
             return false;
-        };
-        let (old, unit) =
-            (space.unit[self.trees[0] as usize], self.unit_at(&space.domain, self.terminals + 1, settings));
-        self.set_unit(space, unit);
+        }
+        self.planned -= 1;
+        let mut plan = std::mem::take(&mut self.plans[self.planned]);
+        let old = space.unit[self.trees[0] as usize];
+        self.prepare(space, settings, rng);
+        let is_joined = self.join(space, &mut plan, settings);
+        if is_joined {
+            self.count(&space.domain, plan.place);
+            self.refused = 0;
+        } else {
+            self.set_unit(space, old);
+            self.relieve(space);
+            self.vacancy.refuse();
+            self.rejected += 1;
+            self.refused += 1;
+            self.is_stuck = self.refused >= MOST_REFUSED;
+        }
+        self.plans[self.planned] = plan;
+        is_joined
+    }
+
+    /// Sets up the space for the next terminal.
+    fn prepare(&mut self, space: &mut Space, settings: &CcoSettings, rng: &mut VesselRng) {
+        self.set_unit(space, self.unit_at(&space.domain, self.terminals + 1, settings));
         space.share = self.share(settings, rng);
         space.blocked = None;
-        space.index.coarsen(self.vacancy.threshold());
         let share = f64::from(self.terminals) / f64::from(settings.terminals);
         space.reserve = 1.0 + RESERVE * (1.0 - share);
-        if self.join(space, place, settings) {
-            self.count(&space.domain, place);
-            self.refused = 0;
-            return true;
-        }
-        self.set_unit(space, old);
-        self.relieve(space);
-        self.vacancy.refuse();
-        self.rejected += 1;
-        self.refused += 1;
-        self.is_stuck = self.refused >= MOST_REFUSED;
-        false
     }
 
-    /// Makes room around the segment that was in the way of the last terminal, unless that was in vain before.
-    fn relieve(&mut self, space: &mut Space) {
-        let Some(segment) = space.blocked.filter(|segment| !self.stuck.contains(segment)) else { return };
-        if !space.relieve(segment) {
-            self.stuck.push(segment);
-        }
-    }
-
-    fn join(&mut self, space: &mut Space, place: DVec3, settings: &CcoSettings) -> bool {
-        let (mut known, mut count) = (0, settings.candidates as usize);
-        let (trees, tolerance) = (&self.trees, settings.tolerance.into());
-        for _ in 0..=CcoSettings::MOST_DOUBLINGS {
-            match self.candidates.connect(space, place, [known, count], tolerance, |tree| trees.contains(&tree)) {
-                Attempt::Connected => return true,
-                Attempt::Failed => (known, count) = (count, 2 * count),
-                Attempt::Hopeless => return false,
+    /// Draws places for some terminals, and ranks their candidates, on all threads. Their number depends on that of the
+    /// terminals alone, so the result is the same on any number of threads. `false` if there is no place.
+    fn plan(&mut self, space: &mut Space, settings: &CcoSettings, rng: &mut VesselRng) -> bool {
+        let is_early = self.terminals < FIRST_BATCH || settings.flow_spread > 0.0;
+        let wanted = if is_early { 1 } else { BATCH.min((settings.terminals - self.terminals) as usize) };
+        self.plans.resize_with(wanted.max(self.plans.len()), Plan::default);
+        for _ in 0..wanted {
+            let Some(place) = self.vacancy.draw(&space.domain, 0.0, rng) else { break };
+            let apart = self.vacancy.threshold();
+            if self.plans[..self.planned].iter().all(|plan| plan.place.distance(place) >= apart) {
+                self.plans[self.planned].place = place;
+                self.planned += 1;
             }
         }
-        false
+        self.prepare(space, settings, rng);
+        space.index.coarsen(self.vacancy.threshold());
+        let (space, trees) = (&*space, &self.trees);
+        parallel::for_each(&mut self.plans[..self.planned], |_, plan| {
+            plan.rank(space, trees, [0, settings.candidates as usize], settings.tolerance.into());
+        });
+        self.planned > 0
+    }
+
+    /// Makes room around the segment that was in the way of the last terminal, unless that was in vain lately.
+    fn relieve(&mut self, space: &mut Space) {
+        let Some(blocked) = space.blocked else { return };
+        let rejected = self.rejected;
+        self.stuck.retain(|&(_, then)| rejected < then + PATIENCE);
+        let is_in_vain = self.stuck.iter().any(|&(segment, _)| segment == blocked[0]);
+        if !is_in_vain && !space.relieve(blocked) {
+            self.stuck.push((blocked[0], rejected));
+        }
+    }
+
+    fn join(&mut self, space: &mut Space, plan: &mut Plan, settings: &CcoSettings) -> bool {
+        let (mut known, mut count, mut doublings) = (0, settings.candidates as usize, 0);
+        let tolerance = settings.tolerance.into();
+        loop {
+            match plan.candidates.connect(space, plan.place, tolerance) {
+                Attempt::Connected => return true,
+                Attempt::Hopeless => return false,
+                Attempt::Outdated => {}
+                Attempt::Failed if doublings == CcoSettings::MOST_DOUBLINGS => return false,
+                Attempt::Failed => {
+                    (known, count) = (count, 2 * count);
+                    doublings += 1;
+                }
+            }
+            plan.rank(space, &self.trees, [known, count], tolerance);
+        }
     }
 
     pub(super) fn report(&self, space: &Space, settings: &CcoSettings) -> CcoReport {
@@ -248,6 +310,6 @@ impl System {
 
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.vacancy.bytes() + self.candidates.bytes()
+        self.vacancy.bytes()
     }
 }

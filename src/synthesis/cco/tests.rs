@@ -37,7 +37,7 @@ fn connect_by_brute_force(space: &mut Space, place: DVec3, count: usize) -> bool
     near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     near.truncate(count);
     let mut paths = Paths::default();
-    paths.clear(&space.forest);
+    paths.clear();
     let search = |&(_, segment): &(f64, u32)| space.search(&space.guess(segment, place, &mut paths), 1e-4);
     let mut costs: Vec<_> = near.iter().filter_map(search).collect();
     costs.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.segment.cmp(&b.segment)));
@@ -64,7 +64,8 @@ fn branch_and_bound_chooses_as_a_full_evaluation_does() {
                 }
                 let mut twin = space.clone();
                 let by_force = connect_by_brute_force(&mut twin, place, 20);
-                match candidates.connect(&mut space, place, [0, 20], 1e-4, |_| true) {
+                candidates.rank(&space, place, [0, 20], 1e-4, |_| true);
+                match candidates.connect(&mut space, place, 1e-4) {
                     // Such places are refused before anything is tried.
                     Attempt::Hopeless => continue,
                     attempt => assert_eq!(attempt == Attempt::Connected, by_force),
@@ -108,7 +109,8 @@ fn sums_and_strains_stay_exact_through_changes_and_undoing() {
     for round in 0..500 {
         let place = tissue.sample(&mut rng).expect("a point").as_dvec3();
         let before = space.forest.nodes.clone();
-        if candidates.connect(&mut space, place, [0, 10], 1e-4, |_| true) != Attempt::Connected {
+        candidates.rank(&space, place, [0, 10], 1e-4, |_| true);
+        if candidates.connect(&mut space, place, 1e-4) != Attempt::Connected {
             for (now, before) in space.forest.nodes.iter().zip(&before) {
                 assert_eq!((now.sums, now.bound, now.strain), (before.sums, before.bound, before.strain));
             }

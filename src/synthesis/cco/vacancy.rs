@@ -22,6 +22,8 @@ const TRIES: u32 = 100;
 const OFFSETS: [i64; 19] = [0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8, -8, 9, -9];
 /// Largest distance between terminals, in thresholds: places with less density than belongs to it have no terminals.
 const MOST_APART: f64 = 5.0;
+/// Share of draws that count even where there is no density, so that their number is bounded.
+const LEAST_DENSITY: f64 = 0.004;
 /// Cells along the longest side of the tissue in which the mean density is measured.
 const MEAN_CELLS: f64 = 24.0;
 /// The threshold falls no lower than this share of a terminal's own size, far below what terminals need that are drawn
@@ -170,6 +172,10 @@ impl Vacancy {
                 let within = DVec3::new(rng.random(), rng.random(), rng.random());
                 // Rounded, as it will be kept.
                 let point = self.at(domain, cell, within).as_vec3().as_dvec3();
+                // As often as terminals are dense, so that all parts fill at the same pace.
+                if !self.is_uniform && rng.random::<f64>() >= domain.density(point).max(LEAST_DENSITY) {
+                    continue;
+                }
                 let nearest = self.reach(domain, point).map(|reach| self.nearest(domain, point, reach));
                 match nearest {
                     Some(Some(nearest)) => {

@@ -1,4 +1,4 @@
-//! Files: trees are written as SWC, OBJ and CSV, and read from SWC; closed surfaces of vessels are
+//! Files: trees are written as SWC, GXL, OBJ and CSV, and as SVG and EPS pictures, and read from SWC; closed surfaces of vessels are
 //! written as GLB, STL, PLY, OBJ and OFF; organ meshes are read from GLB, glTF and OBJ. GLB, and the reading of meshes,
 //! need the feature `mesh_files`.
 //!
@@ -32,6 +32,7 @@
 mod atomic;
 mod lines;
 mod mesh;
+mod picture;
 mod regular_file;
 mod surface;
 mod tree;
@@ -40,6 +41,7 @@ pub use atomic::{WriteError, remove_stale, write_atomically};
 #[cfg(feature = "mesh_files")]
 pub use mesh::{MeshDataError, MeshReadError, load_mesh, read_glb, read_obj_mesh};
 pub use mesh::{ObjOptions, save_obj, write_obj};
+pub use picture::{save_eps, save_svg, write_eps, write_svg};
 pub use surface::{
     SurfaceFormat, SurfaceOptions, SurfacePart, save_surface, save_surface_obj, save_surface_off, save_surface_ply,
     save_surface_stl, write_surface, write_surface_obj, write_surface_off, write_surface_ply, write_surface_stl,
@@ -47,6 +49,6 @@ pub use surface::{
 #[cfg(feature = "mesh_files")]
 pub use surface::{save_surface_glb, write_surface_glb};
 pub use tree::{
-    CsvOptions, ReadError, SwcOptions, SwcReadOptions, kind_of_swc_structure, load_swc, read_swc, save_csv, save_swc,
-    swc_structure, write_csv, write_swc,
+    CsvOptions, GxlOptions, ReadError, SwcOptions, SwcReadOptions, kind_of_swc_structure, load_swc, read_swc, save_csv,
+    save_gxl, save_levels, save_swc, swc_structure, write_csv, write_gxl, write_levels, write_swc,
 };

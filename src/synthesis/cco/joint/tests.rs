@@ -42,7 +42,8 @@ fn the_place_of_least_volume_is_that_of_a_dense_search() {
         let load = flow * rng.random::<f64>() * 4.0;
         let below = Below { load, power: exponent.raise(load, load.sqrt()), span: rng.random::<f64>() * 20.0 };
         let joint = Joint { ends, flows: [flow, 1.0], below: [below, Below::default()], exponent };
-        let found = joint.settle(joint.start(), &Slope::ROOT, 1e-14);
+        let start = joint.start();
+        let found = joint.settle(start, &joint.sums(start), &Slope::ROOT, 1e-14);
         let best = dense(&joint);
         let excess = volume(&joint, found) / volume(&joint, best) - 1.0;
         // At an end, where a segment vanishes, there is nothing to be found: such candidates are too short.
