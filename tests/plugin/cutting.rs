@@ -10,7 +10,7 @@ use bevy_vessels::{
     },
     synthesis::{
         tree::{NodeId, Place},
-        wound::{Blade, EndSide},
+        wound::{Blade, EndSide, Retraction},
     },
 };
 
@@ -31,6 +31,12 @@ fn to_world(app: &App, organ: Entity, kind: VesselKind) -> Affine3A {
     app.world().get::<GlobalTransform>(vessels).expect("vessels are somewhere").affine()
 }
 
+/// Ends that stay where they are cut. Those that draw back may leave a segment, since vessels on a bent surface have short
+/// ones.
+fn that_stay() -> Cuttable {
+    Cuttable { retraction: Retraction { radii: 0.0, length: 0.0 } }
+}
+
 /// Segments that cross a plane of the world.
 fn across_plane(app: &App, organ: Entity, kind: VesselKind, point: Vec3, normal: Vec3) -> Vec<NodeId> {
     let (vessels, to_world) = (published(app.world(), organ, kind), to_world(app, organ, kind));
@@ -43,6 +49,7 @@ fn across_plane(app: &App, organ: Entity, kind: VesselKind, point: Vec3, normal:
 fn a_blade_of_the_world_severs_what_it_crosses_however_the_organ_hangs() {
     let mut app = timed_app(FRAME);
     let organ = grown(&mut app, ());
+    app.world_mut().entity_mut(organ).insert(that_stay());
     hang_askew(&mut app, organ);
     let to_world_now = to_world(&app, organ, VesselKind::Artery);
     assert!(to_world_now.matrix3.determinant() < 0.0, "the organ is mirrored");
@@ -302,6 +309,7 @@ fn the_picker_finds_the_nearest_wall_under_uneven_scale() {
 fn a_regrowth_has_no_wounds() {
     let mut app = timed_app(FRAME);
     let organ = grown(&mut app, ());
+    app.world_mut().entity_mut(organ).insert(that_stay());
     cut(&mut app, square(Vec3::ZERO, Vec3::Y, 3.0));
     assert!(!open_ends(&mut app).is_empty());
     app.world_mut().get_mut::<Vasculature>(organ).unwrap().seed = 5;
@@ -321,7 +329,7 @@ fn wounds_stay_while_vessels_go_on_growing() {
     let mut app = timed_app(FRAME);
     app.insert_resource(GrowthBudget::Steps(1));
     let organ = spawn(&mut app, quick());
-    app.world_mut().entity_mut(organ).insert(Cuttable::default());
+    app.world_mut().entity_mut(organ).insert(that_stay());
     run_until(&mut app, "half of the steps", |world| progress(world, organ).step == STEPS / 2);
     app.update();
     let (point, normal) = (Vec3::Y * 0.3, Vec3::Y);

@@ -16,6 +16,7 @@ mod generators;
 mod growth;
 mod observers;
 mod operating_field;
+mod optimised;
 mod paint;
 mod picking;
 mod presets;
@@ -87,9 +88,9 @@ fn quick() -> Vasculature {
     vasculature
 }
 
-/// The settings of space colonization, which all presets use.
+/// The settings of space colonization.
 fn settings_of(vasculature: &mut Vasculature) -> &mut ColonizationSettings {
-    vasculature.generator.colonization_mut().expect("presets colonize")
+    vasculature.generator.colonization_mut().expect("it colonizes")
 }
 
 fn sphere() -> Mesh {

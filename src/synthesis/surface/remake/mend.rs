@@ -25,7 +25,7 @@ const CELL: f32 = 0.45;
 /// The same at most: of a thinner tube, tetrahedra of this size might miss parts.
 const COARSEST: f32 = 0.75;
 /// The most steps of a lattice along one axis.
-const MOST_STEPS: f32 = 80.0;
+const MOST_STEPS: f32 = 56.0;
 /// Room between a patch and the faces that stay, in sizes of its tetrahedra.
 const GAP: f32 = 0.6;
 
