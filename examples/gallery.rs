@@ -57,6 +57,7 @@ fn main() -> AppExit {
         .add_plugins((VesselPlugin { segments, ..default() }, ControlsPlugin))
         .insert_resource(args)
         .add_systems(Startup, (spawn_discs, spawn_liver).chain())
+        .add_systems(PostStartup, keep_thin_vessels_whole)
         .add_systems(Update, see_everything.run_if(resource_equals(View::Window)))
         .add_systems(PostUpdate, place_captions.after(TransformSystems::Propagate))
         .run()
@@ -73,6 +74,13 @@ fn stouter(mut wish: Vasculature, radii: f32) -> Vasculature {
 /// A line of text below a place in the world.
 #[derive(Component)]
 struct Caption(Vec3);
+
+/// Without several samples in each pixel, vessels thinner than a pixel break into dots.
+fn keep_thin_vessels_whole(mut cameras: Query<&mut Msaa, With<Camera3d>>) {
+    for mut samples in &mut cameras {
+        samples.set_if_neq(Msaa::Sample4);
+    }
+}
 
 fn spawn_discs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets, mut shots: ResMut<Shots>) {
     for (index, (caption, preset, only)) in DISCS.into_iter().enumerate() {

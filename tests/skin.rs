@@ -42,6 +42,7 @@ fn followed(tree: &VesselTree, mesh: &SurfaceMesh, to: impl Fn(Vec3) -> Vec3) ->
 fn at_rest_nothing_moves_and_rigid_motions_are_exact() {
     for tree in [grown(60), tee()] {
         let mesh = surface(&tree);
+        let tangents = mesh.tangents();
         let size = tree.positions().iter().fold(0.0f32, |most, at| most.max(at.length()));
         for angle in [0.0, 0.3, 1.5, 3.0, -2.5] {
             let turn = Quat::from_axis_angle(Vec3::new(0.3, -1.0, 0.6).normalize(), angle);
@@ -50,7 +51,7 @@ fn at_rest_nothing_moves_and_rigid_motions_are_exact() {
             for (vertex, now) in moved.iter().enumerate() {
                 assert!(now.position.distance(turn * mesh.positions[vertex] + by) < 1e-4 * size, "vertex {vertex}");
                 assert!(now.normal.distance(turn * mesh.normals[vertex]) < 1e-3);
-                assert!(now.tangent.distance(turn * mesh.tangents[vertex].truncate()) < 1e-3);
+                assert!(now.tangent.distance(turn * tangents[vertex].truncate()) < 1e-3);
             }
         }
     }

@@ -21,7 +21,10 @@ pub fn sound_surface(name: &str, tree: &VesselTree, settings: &SurfaceSettings) 
     let unit = |vector: Vec3| (vector.length() - 1.0).abs() < 1e-3;
     assert!(mesh.positions.iter().all(|position| position.is_finite()), "{name}: positions");
     assert!(mesh.normals.iter().all(|normal| unit(*normal)), "{name}: normals");
-    assert!(mesh.tangents.iter().all(|tangent| unit(tangent.truncate()) && tangent.w.abs() == 1.0), "{name}: tangents");
+    assert!(
+        mesh.tangents().iter().all(|tangent| unit(tangent.truncate()) && tangent.w.abs() == 1.0),
+        "{name}: tangents"
+    );
     assert!(mesh.uvs.iter().all(|uv| uv.is_finite()), "{name}: texture coordinates");
     assert!(mesh.nodes.iter().all(|&node| (node as usize) < tree.len()), "{name}: nodes");
     surface

@@ -227,7 +227,7 @@ fn textures_have_one_size_and_tangents_follow_them() {
             assert!((shown / length - 1.0).abs() < 0.1, "{shown} for {length}");
         }
     }
-    for (vertex, tangent) in mesh.tangents.iter().enumerate() {
+    for (vertex, tangent) in mesh.tangents().iter().enumerate() {
         let (position, normal) = (mesh.positions[vertex], mesh.normals[vertex]);
         assert!(tangent.truncate().dot(normal).abs() < 1e-3);
         if (2.0..10.0).contains(&position.z) {

@@ -115,7 +115,8 @@ pub(super) async fn build(source: Source, pace: Pace) -> Result<(Built, Vec<Mesh
     let aabb = box_around(vertices(), origin, room);
     let mut meshes = Vec::with_capacity(built.len());
     for level in &built {
-        meshes.push(mesh_around(&level.surface.mesh, origin));
+        let tangents = level.surface.mesh.tangents_paced(&pace.part(0.95..1.0)).await;
+        meshes.push(mesh_around(&level.surface.mesh, origin, tangents));
         pace.rest(1.0).await;
     }
     Ok((Built { tree: Arc::new(tree), remains, levels: built, origin, aabb, room }, meshes))

@@ -4,9 +4,10 @@ use crate::synthesis::{binding::SkinVertex, surface::SurfaceMesh};
 use bevy::{
     asset::RenderAssetUsages,
     camera::primitives::Aabb,
-    math::Vec3,
+    math::{Vec3, Vec4},
     mesh::{Indices, Mesh, MeshVertexAttribute, PrimitiveTopology, VertexAttributeValues},
 };
+use std::sync::Arc;
 
 /// Most vertices that indices of 16 bits can count; the last index is reserved.
 const MOST_SHORT: usize = u16::MAX as usize;
@@ -15,12 +16,12 @@ const MOST_SHORT: usize = u16::MAX as usize;
 /// it. Vertices have the order of the surface.
 impl From<&SurfaceMesh> for Mesh {
     fn from(surface: &SurfaceMesh) -> Self {
-        mesh_around(surface, Vec3::ZERO)
+        mesh_around(surface, Vec3::ZERO, surface.tangents())
     }
 }
 
-/// The same, with positions from an origin.
-pub(super) fn mesh_around(surface: &SurfaceMesh, origin: Vec3) -> Mesh {
+/// The same, with positions from an origin, and the surface's tangents.
+pub(super) fn mesh_around(surface: &SurfaceMesh, origin: Vec3, tangents: Vec<Vec4>) -> Mesh {
     let positions: Vec<[f32; 3]> = surface.positions.iter().map(|&at| (at - origin).to_array()).collect();
     let indices = surface.triangles().flatten();
     let indices = if positions.len() <= MOST_SHORT {
@@ -32,7 +33,7 @@ pub(super) fn mesh_around(surface: &SurfaceMesh, origin: Vec3) -> Mesh {
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
         .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, surface.normals.clone())
         .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, surface.uvs.clone())
-        .with_inserted_attribute(Mesh::ATTRIBUTE_TANGENT, surface.tangents.clone())
+        .with_inserted_attribute(Mesh::ATTRIBUTE_TANGENT, tangents)
         .with_inserted_indices(indices)
 }
 
@@ -63,10 +64,11 @@ fn write(mesh: &mut Mesh, attribute: MeshVertexAttribute, values: impl Iterator<
 
 /// The vertices of a surface at rest.
 pub(super) fn at_rest(surface: &SurfaceMesh) -> impl ExactSizeIterator<Item = SkinVertex> + Clone {
-    (0..surface.positions.len()).map(|vertex| SkinVertex {
+    let tangents: Arc<[Vec4]> = surface.tangents().into();
+    (0..surface.positions.len()).map(move |vertex| SkinVertex {
         position: surface.positions[vertex],
         normal: surface.normals[vertex],
-        tangent: surface.tangents[vertex].truncate(),
+        tangent: tangents[vertex].truncate(),
     })
 }
 

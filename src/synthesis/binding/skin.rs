@@ -106,8 +106,9 @@ impl Skin {
         };
         let segments = pace.part(0.0..0.2).collect(nodes, segment).await;
         let nearby = Nearby { tree, children: &tree.children() };
-        let bond = |vertex| Bond::of(mesh, vertex, &nearby);
-        let bonds = pace.part(0.2..1.0).collect(mesh.nodes.len(), bond).await;
+        let tangents = mesh.tangents_paced(&pace.part(0.2..0.3)).await;
+        let bond = |vertex: usize| Bond::of(mesh, vertex, tangents[vertex].truncate(), &nearby);
+        let bonds = pace.part(0.3..1.0).collect(mesh.nodes.len(), bond).await;
         let (sums, turns) = (vec![Mat3::ZERO; nodes], vec![Quat::IDENTITY; nodes]);
         Ok(Self { segments, moved: vec![SkinVertex::default(); bonds.len()], bonds, sums, turns })
     }
@@ -168,11 +169,10 @@ impl Skin {
 }
 
 impl Bond {
-    fn of(mesh: &SurfaceMesh, vertex: usize, nearby: &Nearby) -> Self {
+    fn of(mesh: &SurfaceMesh, vertex: usize, tangent: Vec3, nearby: &Nearby) -> Self {
         let (at, tree) = (mesh.positions[vertex], nearby.tree);
         let node = nearby.nearest(mesh.nodes[vertex], at);
         let normal = mesh.normals.get(vertex).copied().unwrap_or_default();
-        let tangent = mesh.tangents.get(vertex).map_or(Vec3::ZERO, |tangent| tangent.truncate());
         let (parent, start, share) = nearby.foot(node, at);
         Self { node, parent, share, offset: at - start.lerp(tree.positions()[node as usize], share), normal, tangent }
     }

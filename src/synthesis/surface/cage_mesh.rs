@@ -35,7 +35,8 @@ pub(super) async fn as_it_is(half_edges: HalfEdges, origin: Vec3, pace: &Pace) -
         }
     }
     (mesh.radii, mesh.nodes) = (half_edges.vertices.radii, half_edges.vertices.nodes);
-    mesh.complete(pace).await;
+    mesh.complete();
+    pace.rest(1.0).await;
     mesh
 }
 

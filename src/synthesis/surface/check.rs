@@ -15,7 +15,7 @@ pub struct SurfaceCheck {
     pub intersections: Vec<[u32; 2]>,
     /// The segments of these triangles, by their nodes, the lower first; each pair once. A segment may meet itself.
     pub vessels: Vec<[NodeId; 2]>,
-    /// Vertices with a position, normal or tangent that is not finite.
+    /// Vertices with a position, normal or texture coordinate that is not finite.
     pub not_finite: Vec<u32>,
 }
 
@@ -64,7 +64,7 @@ impl SurfaceMesh {
         vessels.sort_unstable();
         vessels.dedup();
         let is_finite = |vertex: usize| {
-            self.positions[vertex].is_finite() && self.normals[vertex].is_finite() && self.tangents[vertex].is_finite()
+            self.positions[vertex].is_finite() && self.normals[vertex].is_finite() && self.uvs[vertex].is_finite()
         };
         let not_finite = (0..self.positions.len()).filter(|&vertex| !is_finite(vertex)).map(|vertex| vertex as u32);
         SurfaceCheck { closure, intersections, vessels, not_finite: not_finite.collect() }

@@ -33,7 +33,8 @@ pub(super) async fn finish(mut half_edges: HalfEdges, origin: Vec3, pace: &Pace)
     drop((half_edges, split.face_of, split.edges));
     (mesh.uvs, mesh.copies) = (charts.uvs, charts.copies);
     (mesh.radii, mesh.nodes) = (vertices.radii, vertices.nodes);
-    mesh.complete(&pace.part(0.9..1.0)).await;
+    mesh.complete();
+    pace.rest(1.0).await;
     mesh
 }
 

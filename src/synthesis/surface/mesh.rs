@@ -2,7 +2,7 @@
 
 use super::direction::unit;
 use crate::synthesis::mesh::Closure;
-use crate::synthesis::pace::Pace;
+use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::{Vec2, Vec3, Vec4};
 
 /// A closed mesh around a vessel tree.
@@ -16,8 +16,6 @@ pub struct SurfaceMesh {
     pub positions: Vec<Vec3>,
     /// Unit normals, outwards.
     pub normals: Vec<Vec3>,
-    /// Unit tangents in the direction of rising u, with the sign of the bitangent as fourth value, as in glTF.
-    pub tangents: Vec<Vec4>,
     /// Texture coordinates: u around the vessel, from minus to plus half its circumference, and v along it from its
     /// base, both in tissue lengths. So a texture that repeats has the same size from trunk to twig.
     pub uvs: Vec<Vec2>,
@@ -80,8 +78,8 @@ impl SurfaceMesh {
 }
 
 impl SurfaceMesh {
-    /// Adds what follows from the rest: all but the texture coordinates of copies, and tangents.
-    pub(super) async fn complete(&mut self, pace: &Pace) {
+    /// Adds what copies share with their originals.
+    pub(super) fn complete(&mut self) {
         let count = self.copies.len();
         self.positions.reserve_exact(count);
         self.normals.reserve_exact(count);
@@ -94,12 +92,17 @@ impl SurfaceMesh {
             self.radii.push(self.radii[original]);
             self.nodes.push(self.nodes[original]);
         }
-        pace.rest(0.2).await;
-        self.set_tangents(pace).await;
     }
 
-    /// Tangents: the direction of rising u on the faces around each vertex, across its normal.
-    async fn set_tangents(&mut self, pace: &Pace) {
+    /// Unit tangents of all vertices, for normal maps: the direction of rising u on the faces around each vertex, across
+    /// its normal, with the sign of the bitangent as fourth value, as in glTF. They are not stored: a large mesh takes a
+    /// quarter less memory without them.
+    pub fn tangents(&self) -> Vec<Vec4> {
+        at_once(self.tangents_paced(&Pace::default()))
+    }
+
+    /// The same as [paced](crate::synthesis::pace) work.
+    pub async fn tangents_paced(&self, pace: &Pace) -> Vec<Vec4> {
         let mut tangents = vec![Vec4::W; self.positions.len()];
         let add = |face: usize| {
             let [a, b, c, d] = self.faces[face];
@@ -114,14 +117,14 @@ impl SurfaceMesh {
                 tangents[vertex as usize] += tangent.extend(0.0);
             }
         };
-        pace.part(0.2..0.7).each(self.faces.len(), add).await;
-        pace.part(0.7..1.0)
+        pace.part(0.0..0.6).each(self.faces.len(), add).await;
+        pace.part(0.6..1.0)
             .each(tangents.len(), |vertex| {
                 let (sum, normal) = (tangents[vertex].truncate(), self.normals[vertex]);
                 let flat = sum - normal * normal.dot(sum);
                 tangents[vertex] = unit(flat).unwrap_or_else(|| normal.any_orthonormal_vector()).extend(1.0);
             })
             .await;
-        self.tangents = tangents;
+        tangents
     }
 }

@@ -156,10 +156,8 @@ impl Sketch<'_> {
     }
 
     fn vertex(&mut self, station: &Station, position: Vec3, normal: Vec3, uv: Vec2) {
-        let tangent = unit(station.ahead.cross(normal)).unwrap_or(station.right);
         self.mesh.positions.push(position);
         self.mesh.normals.push(normal);
-        self.mesh.tangents.push(tangent.extend(1.0));
         self.mesh.uvs.push(uv);
         self.mesh.radii.push(station.radius);
         self.mesh.nodes.push(station.node);

@@ -129,7 +129,6 @@ fn unequal_length(mesh: &SurfaceMesh) -> Option<String> {
     let vertices = mesh.positions.len();
     let arrays = [
         ("normals", mesh.normals.len()),
-        ("tangents", mesh.tangents.len()),
         ("texture coordinates", mesh.uvs.len()),
         ("radii", mesh.radii.len()),
         ("nodes", mesh.nodes.len()),
@@ -169,7 +168,6 @@ fn odd_number(part: &SurfacePart) -> Option<String> {
     }
     first_odd("position", &mesh.positions, |value| value.is_finite())
         .or_else(|| first_odd("normal", &mesh.normals, |value| value.is_finite()))
-        .or_else(|| first_odd("tangent", &mesh.tangents, |value| value.is_finite()))
         .or_else(|| first_odd("texture coordinate", &mesh.uvs, |value| value.is_finite()))
         .or_else(|| first_odd("radius", &mesh.radii, |value| value.is_finite()))
 }
@@ -183,7 +181,7 @@ fn first_odd<T: std::fmt::Debug>(name: &str, values: &[T], is_finite: impl Fn(&T
 mod tests {
     use super::super::testing::{assert_closed, lopsided, prism, tree};
     use super::*;
-    use bevy_math::{Vec2, Vec3, Vec4};
+    use bevy_math::{Vec2, Vec3};
 
     /// The message for a prism that was changed.
     fn fault(change: impl FnOnce(&mut SurfaceMesh)) -> String {
@@ -210,7 +208,6 @@ mod tests {
             (fault(|mesh| mesh.radii.push(1.0)), "radii for"),
             (fault(|mesh| mesh.positions[1].y = f32::NAN), "vertex 1 has the position Vec3(0.309"),
             (fault(|mesh| mesh.normals[1] = Vec3::INFINITY), "vertex 1 has the normal"),
-            (fault(|mesh| mesh.tangents[0] = Vec4::NAN), "vertex 0 has the tangent"),
             (fault(|mesh| mesh.uvs[0] = Vec2::NAN), "vertex 0 has the texture coordinate"),
             (fault(|mesh| mesh.radii[0] = f32::NEG_INFINITY), "vertex 0 has the radius -inf"),
         ] {

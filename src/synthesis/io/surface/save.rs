@@ -175,7 +175,7 @@ mod tests {
             2 => mesh.nodes[vertex] = index,
             3 => mesh.positions[vertex].y = value,
             4 => mesh.uvs[vertex].y = value,
-            5 => mesh.tangents[vertex].w = value,
+            5 => mesh.normals[vertex].x = value,
             6 => mesh.copies = vec![index; number(40)],
             7 => mesh.positions.truncate(vertex),
             _ => mesh.faces[number(16)] = [index; 4],

@@ -25,7 +25,6 @@ pub(super) fn prism(sides: u32, rings: u32) -> SurfaceMesh {
     let mut vertex = |position: Vec3, normal: Vec3, u: f32, node: u32| {
         mesh.positions.push(position);
         mesh.normals.push(normal);
-        mesh.tangents.push(normal.any_orthonormal_vector().extend(1.0));
         mesh.uvs.push(Vec2::new(u, position.z));
         mesh.radii.push(1.0 / (node + 1) as f32);
         mesh.nodes.push(node);

@@ -1,14 +1,14 @@
 //! Grafts: faces that take the place of others in a mesh.
 //!
 //! In: patches, each with the faces that it replaces. Out: the mesh with all of them. New vertices get their normals,
-//! tangents and texture coordinates from the tube that they lie on.
+//! and texture coordinates from the tube that they lie on.
 
 use super::tubes::Cone;
 use crate::synthesis::surface::curve::Curve;
 use crate::synthesis::surface::direction::{across, unit};
 use crate::synthesis::surface::mesh::SurfaceMesh;
 use crate::synthesis::surface::trunks::Trunks;
-use bevy_math::{Vec2, Vec3, Vec4};
+use bevy_math::{Vec2, Vec3};
 use std::{collections::BTreeMap, f32::consts::TAU};
 
 /// Cosine of the angle between a tube's normal and that of the faces from which on a vertex has the latter: 20°.
@@ -54,9 +54,8 @@ struct Spot {
     length: f32,
     angle: f32,
     radius: f32,
-    /// Unit directions out of the tube and along it.
+    /// Unit direction out of the tube.
     out: Vec3,
-    ahead: Vec3,
 }
 
 /// Where curves lie, and the nodes along them.
@@ -84,7 +83,7 @@ impl Lines<'_> {
         let away = point - cone.centers[0].lerp(cone.centers[1], share);
         let out = unit(away).unwrap_or_else(|| across(away, station.ahead));
         let angle = station.angle_of(out);
-        Some(Spot { trunk: cone.trunk, length, angle, radius: station.radius, out, ahead: station.ahead })
+        Some(Spot { trunk: cone.trunk, length, angle, radius: station.radius, out })
     }
 
     fn node(&self, spot: &Spot) -> u32 {
@@ -110,14 +109,13 @@ struct Parts {
     /// Data of new vertices.
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
-    tangents: Vec<Vec4>,
     radii: Vec<f32>,
     nodes: Vec<u32>,
     uvs: Vec<Option<Vec2>>,
     /// New triangles, of references.
     triangles: Vec<[Corner; 3]>,
     /// Copies of vertices: of whom, and with which coordinates.
-    copies: Vec<(Corner, Vec2, Vec4)>,
+    copies: Vec<(Corner, Vec2)>,
 }
 
 /// A mesh and what comes into it.
@@ -142,12 +140,11 @@ impl Draft<'_> {
         let spots: Vec<Option<Spot>> = graft.positions.iter().map(|&position| nearest(position)).collect();
         let normals = graft.normals(&self.old.positions[..unique as usize]);
         for ((&position, spot), normal) in graft.positions.iter().zip(&spots).zip(normals) {
-            let (out, ahead) = spot.map_or((Vec3::X, Vec3::Z), |spot| (spot.out, spot.ahead));
+            let out = spot.map_or(Vec3::X, |spot| spot.out);
             // In a crease, the surface is that of no tube.
             let out = if out.dot(normal) < CREASED { normal } else { out };
             self.new.positions.push(position);
             self.new.normals.push(out);
-            self.new.tangents.push(across(ahead.cross(out), out).extend(1.0));
             self.new.radii.push(spot.map_or(0.0, |spot| spot.radius));
             self.new.nodes.push(spot.map_or(0, |spot| lines.node(&spot)));
             self.new.uvs.push(None);
@@ -173,7 +170,7 @@ impl Draft<'_> {
                 // The angle nearest to that of the first corner, so that no triangle runs all the way round.
                 let angle = spot.angle + TAU * ((leading.angle - spot.angle) / TAU).round();
                 let uv = Vec2::new(angle * spot.radius, spot.length);
-                *corner = self.charted(*corner, uv, &spot);
+                *corner = self.charted(*corner, uv);
             }
             self.new.triangles.push(charted);
         }
@@ -188,7 +185,7 @@ impl Draft<'_> {
     }
 
     /// A vertex with these texture coordinates.
-    fn charted(&mut self, corner: Corner, uv: Vec2, spot: &Spot) -> Corner {
+    fn charted(&mut self, corner: Corner, uv: Vec2) -> Corner {
         if let Corner::New(vertex) = corner {
             let own = self.new.uvs[vertex as usize].get_or_insert(uv);
             if *own == uv {
@@ -197,14 +194,8 @@ impl Draft<'_> {
         }
         let key = (corner, [uv.x.to_bits(), uv.y.to_bits()]);
         let copies = &mut self.new.copies;
-        let normal = match corner {
-            Corner::Old(vertex) => self.old.normals[vertex as usize],
-            Corner::New(vertex) => self.new.normals[vertex as usize],
-            Corner::Copy(_) => spot.out,
-        };
         let copy = *self.known.entry(key).or_insert_with(|| {
-            let tangent = across(spot.ahead.cross(spot.out), normal);
-            copies.push((corner, uv, tangent.extend(1.0)));
+            copies.push((corner, uv));
             copies.len() as u32 - 1
         });
         Corner::Copy(copy)
@@ -232,7 +223,6 @@ impl Parts {
         let uvs = self.uvs.into_iter().map(Option::unwrap_or_default).collect();
         exchange(&mut mesh.positions, &stays, unique, self.positions);
         exchange(&mut mesh.normals, &stays, unique, self.normals);
-        exchange(&mut mesh.tangents, &stays, unique, self.tangents);
         exchange(&mut mesh.radii, &stays, unique, self.radii);
         exchange(&mut mesh.nodes, &stays, unique, self.nodes);
         exchange(&mut mesh.uvs, &stays, unique, uvs);
@@ -242,13 +232,12 @@ impl Parts {
             Corner::New(vertex) => unique as u32 + vertex,
             Corner::Copy(copy) => first_copy + copy,
         };
-        for &(corner, uv, tangent) in &self.copies {
+        for &(corner, uv) in &self.copies {
             let original = number(corner) as usize;
             mesh.positions.push(mesh.positions[original]);
             mesh.normals.push(mesh.normals[original]);
             mesh.radii.push(mesh.radii[original]);
             mesh.nodes.push(mesh.nodes[original]);
-            mesh.tangents.push(tangent);
             mesh.uvs.push(uv);
             mesh.copies.push(original as u32);
         }

@@ -88,7 +88,7 @@ fn write_arrays(out: &mut impl Write, part: &SurfacePart) -> io::Result<()> {
     let (mesh, measures) = (part.mesh, Measures::of(part.tree));
     write_floats(out, mesh.positions.iter().flat_map(|position| position.to_array()))?;
     write_floats(out, mesh.normals.iter().flat_map(|normal| normal.to_array()))?;
-    write_floats(out, mesh.tangents.iter().flat_map(|tangent| tangent.to_array()))?;
+    write_floats(out, mesh.tangents().iter().flat_map(|tangent| tangent.to_array()))?;
     write_floats(out, mesh.uvs.iter().flat_map(|uv| uv.to_array()))?;
     for _ in &mesh.positions {
         out.write_all(&[u8::MAX; 4])?;

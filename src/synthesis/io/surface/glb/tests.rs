@@ -35,7 +35,7 @@ fn assert_holds(primitive: &Primitive, blob: &[u8], mesh: &SurfaceMesh) {
     let positions: Vec<Vec3> = reader.read_positions().unwrap().map(Vec3::from_array).collect();
     assert_eq!(positions, mesh.positions);
     assert_eq!(reader.read_normals().unwrap().map(Vec3::from_array).collect::<Vec<_>>(), mesh.normals);
-    assert_eq!(reader.read_tangents().unwrap().map(Vec4::from_array).collect::<Vec<_>>(), mesh.tangents);
+    assert_eq!(reader.read_tangents().unwrap().map(Vec4::from_array).collect::<Vec<_>>(), mesh.tangents());
     let uvs = reader.read_tex_coords(0).unwrap().into_f32();
     assert_eq!(uvs.map(Vec2::from_array).collect::<Vec<_>>(), mesh.uvs);
     let colors: Vec<[f32; 4]> = reader.read_colors(0).unwrap().into_rgba_f32().collect();
