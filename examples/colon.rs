@@ -95,7 +95,7 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
     if args.organ.mode == Mode::Surface {
         spawn("colon", colon.mesh.part(colon.outer.clone()), Some(outside));
         spawn("rim", colon.mesh.part(colon.outer.end..colon.inner.start), None);
-        let inside = args.organ.vessels(Some(&colon.inner_roots), 0.4);
+        let inside = args.organ.vessels(Some(&colon.inner_roots), 0.4).with_tissue(TissueMode::Lining);
         spawn("mucosa", colon.mesh.part(colon.inner.clone()), Some(inside));
     } else {
         spawn("colon", colon.mesh.clone(), Some(outside));

@@ -113,7 +113,7 @@ pub fn padded(seed: u64) -> String {
 fn mode_of(source: &TissueSource) -> Option<Mode> {
     let TissueSource::Mesh(mesh) = source else { return None };
     Some(match mesh.mode {
-        TissueMode::Surface => Mode::Surface,
+        TissueMode::Surface | TissueMode::Lining => Mode::Surface,
         TissueMode::Volume => Mode::Volume,
         TissueMode::Staged { .. } => Mode::Staged,
     })

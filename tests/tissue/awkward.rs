@@ -4,7 +4,7 @@ use super::{Outcome, ball_soup};
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     mesh::TriangleMesh,
-    tissue::{Extent, MeshSurface, MeshVolume, Tissue, TissueError},
+    tissue::{Extent, MeshSurface, MeshTissue, MeshVolume, Tissue, TissueError, TissueMode},
 };
 use std::sync::Arc;
 
@@ -192,6 +192,20 @@ fn a_solid_much_thinner_than_a_voxel_is_refused_by_name() -> Outcome {
     for _ in 0..300 {
         let closest = thin.closest_point(super::in_cube(&mut rng, 0.9) * Vec3::new(1.0, 1.0, 0.05)).position;
         assert!(thin.contains(closest), "{closest} is not inside");
+    }
+    Ok(())
+}
+
+/// A mesh that faces into a lumen is a reversed one, unless it is said to be a lining.
+#[test]
+fn a_lining_faces_as_it_is() -> Outcome {
+    let lumen = ball_soup(16, true)?;
+    assert!(faces_away(&MeshSurface::new(lumen.clone())?, Vec3::ZERO, 1.0));
+    assert!(!faces_away(&MeshSurface::lining(lumen.clone())?, Vec3::ZERO, 1.0));
+    for (mode, is_out) in [(TissueMode::Surface, true), (TissueMode::Lining, false)] {
+        let prepared = MeshTissue::from(mode).prepare(lumen.clone())?;
+        let point = prepared.tissue().closest_point(Vec3::X);
+        assert_eq!(point.normal.dot(Vec3::X) > 0.0, is_out, "{mode:?}");
     }
     Ok(())
 }

@@ -60,14 +60,38 @@ impl MeshSurface {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub async fn new_paced(mesh: impl Into<Arc<TriangleMesh>>, pace: &Pace) -> Result<Self, TissueError> {
-        let mesh: Arc<TriangleMesh> = mesh.into();
+        Self::facing_paced(mesh.into(), true, pace).await
+    }
+
+    /// Prepares a mesh whose triangles face the side on which vessels lie, such as the lining of a hollow organ.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn lining(mesh: impl Into<Arc<TriangleMesh>>) -> Result<Self, TissueError> {
+        at_once(Self::lining_paced(mesh, &Pace::default()))
+    }
+
+    /// The same as [paced](crate::synthesis::pace) work.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub async fn lining_paced(mesh: impl Into<Arc<TriangleMesh>>, pace: &Pace) -> Result<Self, TissueError> {
+        Self::facing_paced(mesh.into(), false, pace).await
+    }
+
+    /// Prepares a mesh, with its shells turned outwards or as they are.
+    async fn facing_paced(mesh: Arc<TriangleMesh>, outwards: bool, pace: &Pace) -> Result<Self, TissueError> {
         let bounds = mesh.bounds_paced(&pace.part(0.0..0.02)).await;
         let rounding = rounding_within(&bounds)?;
         let welding = mesh.weld_paced(&pace.part(0.02..0.07)).await;
         let faces = mesh.faces_paced(&welding, &pace.part(0.07..0.15)).await;
         let indexed = IndexedMesh::of_paced(Arc::clone(&mesh), &faces, &pace.part(0.15..0.45)).await;
         let topology = mesh.topology_of_paced(welding, &faces, &pace.part(0.45..0.55)).await;
-        let inward = inward_triangles(&mesh, &topology, indexed.index(), &pace.part(0.55..0.75)).await;
+        let inward = if outwards {
+            inward_triangles(&mesh, &topology, indexed.index(), &pace.part(0.55..0.75)).await
+        } else {
+            vec![false; mesh.triangles().len()]
+        };
         let neighbours = Neighbours::new_paced(&mesh, &topology, &pace.part(0.75..0.8)).await;
         let mut areas = vec![0.0; mesh.triangles().len()];
         let measure = |face: usize| areas[faces[face] as usize] = mesh.triangle_area(faces[face] as usize);

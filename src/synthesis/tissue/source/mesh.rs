@@ -15,6 +15,9 @@ pub enum TissueMode {
     /// Over its surface.
     #[default]
     Surface,
+    /// Over the inside of a hollow organ's wall: a mesh whose triangles face into the lumen. Vessels are lifted off that
+    /// side; as a surface, they would be off the other.
+    Lining,
     /// Through its inside.
     Volume,
     /// Over its surface first, then inwards through its inside.
@@ -51,7 +54,7 @@ impl MeshTissue {
     pub fn work(&self, triangles: usize) -> usize {
         let voxels = || (self.resolution as usize).saturating_pow(3);
         match self.mode {
-            TissueMode::Surface => triangles,
+            TissueMode::Surface | TissueMode::Lining => triangles,
             TissueMode::Volume | TissueMode::Staged { .. } => triangles.saturating_add(voxels()),
         }
     }
@@ -71,7 +74,10 @@ impl MeshTissue {
     pub async fn prepare_paced(&self, mesh: Arc<TriangleMesh>, pace: &Pace) -> Result<PreparedTissue, TissueError> {
         let indexed = OnceLock::new();
         let surface = async |pace: Pace| -> Result<Arc<dyn Tissue>, TissueError> {
-            let surface = MeshSurface::new_paced(Arc::clone(&mesh), &pace).await?;
+            let surface = match self.mode {
+                TissueMode::Lining => MeshSurface::lining_paced(Arc::clone(&mesh), &pace).await?,
+                _ => MeshSurface::new_paced(Arc::clone(&mesh), &pace).await?,
+            };
             indexed.get_or_init(|| surface.indexed().clone());
             let surface: Arc<dyn Tissue> = Arc::new(surface);
             Ok(surface)
@@ -81,7 +87,7 @@ impl MeshTissue {
             Ok(volume)
         };
         let (stages, last) = match self.mode {
-            TissueMode::Surface => (Vec::new(), surface(pace.clone()).await?),
+            TissueMode::Surface | TissueMode::Lining => (Vec::new(), surface(pace.clone()).await?),
             TissueMode::Volume => (Vec::new(), volume(pace.clone()).await?),
             TissueMode::Staged { surface_steps } => {
                 let first = surface(pace.part(0.0..0.2)).await?;
