@@ -9,10 +9,7 @@ mod common;
 use bevy::prelude::*;
 use bevy_vessels::{
     prelude::*,
-    synthesis::{
-        organ::{LiverSettings, Viewpoint},
-        tree::ByKind,
-    },
+    synthesis::organ::{LiverSettings, Viewpoint},
 };
 use clap::Parser;
 use common::{
@@ -69,12 +66,11 @@ fn spawn_livers(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets
     if let Some(settings) = optimised.generator.cco_mut() {
         settings.terminals = args.terminals;
     }
-    let shown = VesselAppearance { shown: ByKind::from_fn(|_| true), ..default() };
     for (name, middle, wish) in [("colonized", -BESIDE, colonized), ("optimised", BESIDE, optimised)] {
         assets.spawn(&mut commands, liver.mesh.clone().into(), glass, place(middle)).insert((
             Name::new(name),
             wish,
-            shown.clone(),
+            VesselAppearance::default(),
         ));
     }
     let view = moved(&liver.front, &place(BESIDE));

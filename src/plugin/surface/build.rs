@@ -11,7 +11,7 @@ use crate::synthesis::{
     binding::Skin,
     pace::Pace,
     surface::{Surface, SurfaceError, SurfaceSettings},
-    tree::{NodeId, VesselTree},
+    tree::VesselTree,
     wound::{Remains, Wounds},
 };
 use bevy::{camera::primitives::Aabb, math::Vec3, mesh::Mesh};
@@ -93,16 +93,19 @@ pub(super) async fn build(source: Source, pace: Pace) -> Result<(Built, Vec<Mesh
         None => None,
     };
     let left = remains.as_ref().map_or(&tree, |remains| &remains.tree);
-    let mut built = Vec::with_capacity(levels);
+    let (mut built, mut tangents) = (Vec::with_capacity(levels), Vec::with_capacity(levels));
     for level in 0..levels {
         let pace = pace.part(share_of(level, levels));
         let mut surface = surface_of(left, &settings, level, &pace.part(0.0..0.8)).await?;
+        let along = surface.mesh.tangents_paced(&pace.part(0.8..0.85)).await;
         let skin = match is_followed {
-            true => Some(Skin::new_paced(&surface.mesh, left, &pace.part(0.8..0.9)).await?),
+            true => Some(Skin::with_tangents_paced(&surface.mesh, &along, left, &pace.part(0.85..0.9)).await?),
             false => None,
         };
+        tangents.push(along);
         if let Some(remains) = &remains {
-            name_whole_nodes(&mut surface, remains);
+            let whole = |node: u32| remains.places.get(node as usize).map_or(node, |place| place.node.0);
+            surface.rename_nodes(whole);
         }
         built.push(BuiltLevel { surface: Arc::new(surface), skin });
         pace.rest(1.0).await;
@@ -114,8 +117,7 @@ pub(super) async fn build(source: Source, pace: Pace) -> Result<(Built, Vec<Mesh
     let room = ROOM * widest;
     let aabb = box_around(vertices(), origin, room);
     let mut meshes = Vec::with_capacity(built.len());
-    for level in &built {
-        let tangents = level.surface.mesh.tangents_paced(&pace.part(0.95..1.0)).await;
+    for (level, tangents) in built.iter().zip(tangents) {
         meshes.push(mesh_around(&level.surface.mesh, origin, tangents));
         pace.rest(1.0).await;
     }
@@ -140,16 +142,6 @@ async fn surface_of(
 fn share_of(level: usize, levels: usize) -> Range<f32> {
     let end = |level: usize| if level == levels { 0.95 } else { 0.95 - 0.9 * 0.3f32.powi(level as i32) };
     end(level)..end(level + 1)
-}
-
-/// Replaces nodes of the remains by those of the whole tree.
-fn name_whole_nodes(surface: &mut Surface, remains: &Remains) {
-    let whole = |node: u32| remains.places.get(node as usize).map_or(node, |place| place.node.0);
-    surface.mesh.nodes.iter_mut().for_each(|node| *node = whole(*node));
-    let report = &mut surface.report;
-    for nodes in [&mut report.remade, &mut report.left, &mut report.unclosed, &mut report.absorbed] {
-        nodes.iter_mut().for_each(|node| *node = NodeId(whole(node.0)));
-    }
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use crate::synthesis::{
     surface::SurfaceMesh,
     tree::{NO_PARENT, VesselTree, sweep::Children},
 };
-use bevy_math::{Mat3, Quat, Vec3};
+use bevy_math::{Mat3, Quat, Vec3, Vec4};
 
 /// Fewest vertices worth handing to another thread.
 const WORTH_SHARING: usize = 1024;
@@ -94,6 +94,20 @@ impl Skin {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub async fn new_paced(mesh: &SurfaceMesh, tree: &VesselTree, pace: &Pace) -> Result<Self, BindingError> {
+        let tangents = mesh.tangents_paced(&pace.part(0.0..0.1)).await;
+        Self::with_tangents_paced(mesh, &tangents, tree, &pace.part(0.1..1.0)).await
+    }
+
+    /// The same for a surface whose [tangents](SurfaceMesh::tangents) are known.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub(crate) async fn with_tangents_paced(
+        mesh: &SurfaceMesh,
+        tangents: &[Vec4],
+        tree: &VesselTree,
+        pace: &Pace,
+    ) -> Result<Self, BindingError> {
         let nodes = tree.len();
         if let Some(vertex) = mesh.nodes.iter().position(|&node| node as usize >= nodes) {
             return Err(BindingError::VertexNode { vertex, node: mesh.nodes[vertex], nodes });
@@ -106,9 +120,8 @@ impl Skin {
         };
         let segments = pace.part(0.0..0.2).collect(nodes, segment).await;
         let nearby = Nearby { tree, children: &tree.children() };
-        let tangents = mesh.tangents_paced(&pace.part(0.2..0.3)).await;
         let bond = |vertex: usize| Bond::of(mesh, vertex, tangents[vertex].truncate(), &nearby);
-        let bonds = pace.part(0.3..1.0).collect(mesh.nodes.len(), bond).await;
+        let bonds = pace.part(0.2..1.0).collect(mesh.nodes.len(), bond).await;
         let (sums, turns) = (vec![Mat3::ZERO; nodes], vec![Quat::IDENTITY; nodes]);
         Ok(Self { segments, moved: vec![SkinVertex::default(); bonds.len()], bonds, sums, turns })
     }

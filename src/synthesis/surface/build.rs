@@ -90,13 +90,20 @@ impl Surface {
             let Remade { remade, left } = remake(&mut mesh, &plan, &pace.part(0.9..1.0)).await;
             (report.remade, report.left) = (remade, left);
         }
+        let mut surface = Self { mesh, report };
         if looped.len() > 0 {
-            mesh.nodes.iter_mut().for_each(|node| *node = looped.own(*node));
-            for node in report.remade.iter_mut().chain(&mut report.left) {
-                *node = NodeId(looped.own(node.0));
-            }
+            surface.rename_nodes(|node| looped.own(node));
         }
-        Ok(Self { mesh, report })
+        Ok(surface)
+    }
+
+    /// Names other nodes in place of those of the tree that it was made of.
+    pub(crate) fn rename_nodes(&mut self, name: impl Fn(u32) -> u32) {
+        let Self { mesh, report } = self;
+        mesh.nodes.iter_mut().for_each(|node| *node = name(*node));
+        for nodes in [&mut report.remade, &mut report.left, &mut report.unclosed, &mut report.absorbed] {
+            nodes.iter_mut().for_each(|node| *node = NodeId(name(node.0)));
+        }
     }
 }
 

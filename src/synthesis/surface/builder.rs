@@ -13,6 +13,7 @@ use super::direction::{across, unit};
 use super::exit::Exit;
 use super::layout::{Layout, Mouth};
 use super::loops::Looped;
+use super::parting::CLEAR;
 use super::report::SurfaceReport;
 use super::rings::{Rings, Start};
 use super::rows::{Opening, Row, rows};
@@ -27,6 +28,8 @@ use std::f32::consts::FRAC_PI_4;
 
 /// Length over which a lateral that leaves beside its place comes back to its centre line, as a multiple of the distance.
 const LEAN: f32 = 2.0;
+/// The same for one that ends beside its trunk, as a multiple of its own length: it hardly comes back.
+const FOR_GOOD: f32 = 8.0;
 /// Length along a vessel, from a place that lacks room, within which faces are checked, in radii.
 const DOUBTFUL: f32 = 4.0;
 /// The same for a lateral that leaves so flat that it runs beside its trunk.
@@ -286,7 +289,7 @@ impl<'a> Builder<'a> {
             Seam::Open(other) => {
                 other.cap(&mut self.cage, cap);
                 end.cap(&mut self.cage, cap);
-                self.report.unclosed.push(NodeId(self.looped.own(end.node)));
+                self.report.unclosed.push(NodeId(end.node));
             }
             Seam::Done => end.cap(&mut self.cage, cap),
         }
@@ -312,7 +315,7 @@ impl<'a> Builder<'a> {
         let corner = self.cage.corners.len();
         self.layout.begin(None, corner);
         let Some(&tip) = self.trunks.nodes(trunk).last() else { return };
-        self.report.absorbed.push(NodeId(self.looped.own(tip)));
+        self.report.absorbed.push(NodeId(tip));
         let Some(number) = self.looped.at(tip) else { return };
         match std::mem::replace(&mut self.seams[number], Seam::Done) {
             Seam::Ahead => {}
@@ -323,7 +326,7 @@ impl<'a> Builder<'a> {
             }
             Seam::Done => return,
         }
-        self.report.unclosed.push(NodeId(self.looped.own(tip)));
+        self.report.unclosed.push(NodeId(tip));
     }
 
     /// Tells the laterals where their holes are.
@@ -366,9 +369,10 @@ impl<'a> Builder<'a> {
         if let Some(parting) = exit.parting {
             // Half in its trunk it would have no room for its first ring.
             let height = (branch.at(lift).center - station.center).dot(out);
-            shift += out * (wide + 1.25 * exit.radius - height).max(0.0);
+            shift += out * (wide + CLEAR * exit.radius - height).max(0.0);
             if !parting.is_clear {
-                reach = reach.max(8.0 * (branch.length() - lift));
+                // It ends before it could come back to its centre line.
+                reach = reach.max(FOR_GOOD * (branch.length() - lift));
             }
         }
         let lean = Lean { shift, from: lift, to: lift + reach };

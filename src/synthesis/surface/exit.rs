@@ -9,7 +9,7 @@
 
 use super::curve::Curve;
 use super::direction::{across, unit};
-use super::parting::Parting;
+use super::parting::{CLEAR, Parting};
 use super::spline::Station;
 use bevy_math::{Vec3, ops};
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -23,7 +23,7 @@ pub(super) const HALF_EDGE: f32 = std::f32::consts::FRAC_PI_4;
 const APART: f32 = 3.0;
 const WELL_APART: f32 = 1.5;
 /// Height of the first ring above the trunk, in radii of the lateral.
-const CLEARANCE: f32 = 0.25;
+const CLEARANCE: f32 = CLEAR - 1.0;
 
 /// Where a lateral leaves its trunk.
 #[derive(Clone, Copy, Debug)]
@@ -95,7 +95,7 @@ impl Exit {
         self.slope = self.slope.max(FRAC_1_SQRT_2);
         let onward = curve.at(parting.on_lateral).ahead.dot(station.ahead).signum();
         let run = (1.0 - self.slope * self.slope).max(0.0).sqrt() / self.slope;
-        self.length = (parting.on_trunk - onward * run * self.radius * (1.0 + CLEARANCE)).clamp(0.0, trunk.length());
+        self.length = (parting.on_trunk - onward * run * self.radius * CLEAR).clamp(0.0, trunk.length());
         let opening = trunk.at(self.length);
         self.point = opening.center + across(out, opening.ahead) * opening.radius;
         self.half = HALF_EDGE * self.radius / self.slope;

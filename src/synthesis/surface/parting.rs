@@ -5,9 +5,10 @@
 
 use super::curve::Curve;
 
-/// Distance of both axes at which trunk and lateral are clear of each other, in radii of the trunk and of the lateral: the
-/// cage is wider than the vessels.
-const CLEAR: [f32; 2] = [1.08, 1.25];
+/// Height of a lateral's axis above its trunk's surface at which it is clear of it, in its radii.
+pub(super) const CLEAR: f32 = 1.25;
+/// Radius of a trunk's cage, in radii of the trunk.
+const CAGE: f32 = 1.08;
 /// The least step along the lateral, in its radii.
 const LEAST_STEP: f32 = 0.25;
 /// The most steps: a vessel that runs on beside its trunk for longer never parts.
@@ -37,7 +38,7 @@ impl Parting {
             on_trunk = trunk.foot(here.center, on_trunk);
             let station = trunk.at(on_trunk);
             let distance = here.center.distance(station.center);
-            let lacks = CLEAR[0] * station.radius + CLEAR[1] * here.radius - distance;
+            let lacks = CAGE * station.radius + CLEAR * here.radius - distance;
             if lacks <= 0.0 {
                 return Self { on_trunk, on_lateral, is_clear: true, ends_within: false };
             }
