@@ -172,7 +172,8 @@ fn fan_normal(center: Vec3, neighbours: &[Neighbour]) -> Vec3 {
     unit(sum).unwrap_or(Vec3::Z)
 }
 
-/// Weights of the limit tangents, by valence: for each place around a vertex, those of the edge's end and of the face's
+/// Weights of the limit tangents, by valence: for each place around a vertex, those of the edge's end and of the
+/// face's far corner.
 struct Masks {
     by_valence: Vec<Vec<[[f32; 2]; 2]>>,
 }
