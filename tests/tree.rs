@@ -382,6 +382,10 @@ fn coverage_without_samples_or_nodes_and_with_duplicates() {
     assert_eq!(coverage(&same, &[], 1.0), None);
     assert_eq!(coverage(&VesselTree::new(), &[Vec3::ONE], 1.0), Some(0.0));
     assert_eq!(coverage(&same, &[Vec3::ONE, Vec3::ZERO, Vec3::NAN, Vec3::INFINITY], 0.5), Some(0.25));
+    assert_eq!(coverage(&same, &[Vec3::ZERO, Vec3::NAN, Vec3::INFINITY], f32::INFINITY), Some(1.0 / 3.0));
+    assert_eq!(coverage(&same, &[Vec3::ONE], f32::NAN), Some(0.0));
+    let far = tree(vec![Vec3::ZERO, Vec3::splat(1e6)], vec![NO_PARENT; 2], vec![1.0; 2]);
+    assert_eq!(coverage(&far, &[Vec3::ZERO, Vec3::X * 1e-3, Vec3::splat(1e6), Vec3::ONE], 2e-3), Some(0.75));
     assert_eq!(outside(&same, |_| false), 300);
     assert_eq!(outside(&symmetric(1, 90.0), |p| p.y >= 0.0), 1);
 }

@@ -1,6 +1,7 @@
 //! The settings of one system in the form used by a step: lengths multiplied by λ_t, angles in radians and cosines.
 
 use super::settings::{AngleSpread, SystemSettings};
+use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::tissue::TissueGrowth;
 use crate::synthesis::tree::murray;
 use bevy_math::ops;
@@ -65,18 +66,9 @@ impl Lengths {
         (0.5 * self.terminal_radius).clamp(self.step / 256.0, self.step / 16.0)
     }
 
-    /// Side of the cells of the index over nodes: a little more than the most frequent query distance. Empty cells cost
-    /// nothing, and a cell of this size has about one node.
-    pub fn node_cell(&self) -> f32 {
-        CELL * self.node_birth.max(self.kill).max(0.25 * self.influence)
-    }
-
-    /// Side of the cells of the index over drains.
-    pub fn drain_cell(&self) -> f32 {
-        CELL * self.drain_birth.max(0.25 * self.influence)
+    /// Side of the cells of the indices over nodes and drains, which are asked together: a little more than twice the most
+    /// frequent reach. Empty cells cost nothing, and a cell of this size has about one node.
+    pub fn cell(&self) -> f32 {
+        PointGrid::CELL * self.node_birth.max(self.drain_birth).max(self.kill).max(0.25 * self.influence)
     }
 }
-
-/// Side of a cell relative to the most frequent query distance: a little more than two, so that a ball of that radius
-/// meets at most two cells along each axis.
-const CELL: f32 = 2.01;

@@ -235,7 +235,7 @@ impl Tissue for MeshSurface {
         let slots = self.picks.len() as u32;
         if slots > 0 {
             many::draw(rng, count, candidates, |[slot, keep, v, w]| {
-                Some(self.pick(many::below(slot, slots), many::unit(keep), [many::unit(v), many::unit(w)]))
+                (true, self.pick(many::below(slot, slots), many::unit(keep), [many::unit(v), many::unit(w)]))
             });
         }
     }
