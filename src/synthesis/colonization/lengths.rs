@@ -17,10 +17,10 @@ pub(crate) struct Lengths {
     pub step: f32,
     pub terminal_radius: f32,
     pub direction_weight: f32,
-    /// γ/2 in radians.
-    pub half_perception: f32,
     /// cos γ/2, or below −1 if everything is perceived.
     pub cos_half_perception: f32,
+    /// sin γ/2.
+    pub sin_half_perception: f32,
     pub bifurcation_threshold: f32,
     pub angle_spread: AngleSpread,
     /// Half the angle between the daughters of a symmetric bifurcation, in radians.
@@ -44,8 +44,8 @@ impl Lengths {
             step: settings.step_length * scale,
             terminal_radius: settings.terminal_radius * if settings.scale_terminal_radius { scale } else { 1.0 },
             direction_weight: settings.direction_weight,
-            half_perception,
             cos_half_perception: if half_perception >= PI { -2.0 } else { ops::cos(half_perception) },
+            sin_half_perception: ops::sin(half_perception),
             bifurcation_threshold: settings.bifurcation_threshold.to_radians(),
             angle_spread: settings.angle_spread,
             half_bifurcation: murray::symmetric_half_angle(settings.bifurcation_exponent),

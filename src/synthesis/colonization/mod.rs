@@ -15,6 +15,7 @@ mod drains;
 mod forest;
 mod lengths;
 mod perception;
+mod powers;
 mod report;
 pub mod seam;
 mod settings;
