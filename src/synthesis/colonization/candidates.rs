@@ -3,12 +3,14 @@
 //! Every block of every step has its own stretch of the random stream, so candidates don't depend on the thread or time
 //! of the draw.
 
+use super::step::Step;
 use super::vacancy::Vacancy;
 use crate::synthesis::parallel;
 use crate::synthesis::random::{Stream, VesselRng};
 use crate::synthesis::space::order::SpatialOrder;
-use crate::synthesis::tissue::Tissue;
 use bevy_math::{Vec3, bounding::Aabb3d};
+use std::collections::VecDeque;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Most candidates in a block.
 const BLOCK: u32 = 1024;
@@ -25,47 +27,137 @@ pub(crate) struct Draws {
     /// The random stream, at its beginning.
     rng: VesselRng,
     /// As many as any step needed; surplus ones are empty.
-    blocks: Vec<Vec<Vec3>>,
-    /// The step of the blocks, 0 for none, and whether its candidates were drawn from vacant pieces.
-    drawn: (u32, bool),
+    blocks: Blocks,
 }
+
+/// The candidates of a step, block by block.
+type Blocks = Vec<Vec<Vec3>>;
 
 impl Draws {
     /// The draws of an organ's seed.
     pub fn new(seed: u64) -> Self {
-        Self { rng: Stream::Attraction.rng(seed), blocks: Vec::new(), drawn: (0, false) }
+        Self { rng: Stream::Attraction.rng(seed), blocks: Vec::new() }
     }
 
     /// Takes another seed, keeping memory.
     pub fn restart(&mut self, seed: u64) {
         self.rng = Stream::Attraction.rng(seed);
-        self.drawn = (0, false);
     }
 
-    /// Draws `count` candidates of a step, from vacant pieces if those are known, unless they have been drawn before.
-    pub fn draw(&mut self, tissue: &dyn Tissue, vacancy: Option<&Vacancy>, step: u32, count: u32) {
-        if self.drawn == (step, vacancy.is_some()) {
-            return;
+    /// Draws that may be done on another thread, for as many steps ahead.
+    pub fn ahead(&self, steps: u32) -> Ahead {
+        Ahead { rng: self.rng.clone(), steps, ready: Mutex::default() }
+    }
+
+    /// Draws the candidates of a step, from vacant pieces if those are known. Those of plain tissue may have been drawn
+    /// ahead.
+    pub fn draw(&mut self, step: Step<'_>, vacancy: Option<&Vacancy>, ahead: Option<&Ahead>) {
+        let is_ready = ahead.is_some_and(|ahead| ahead.take(step, vacancy.is_none(), &mut self.blocks));
+        if !is_ready {
+            fill(&self.rng, step, vacancy, &mut self.blocks);
         }
-        self.drawn = (step, vacancy.is_some());
-        let needed = count.div_ceil(BLOCK) as usize;
-        if self.blocks.len() < needed {
-            self.blocks.resize_with(needed, Vec::new);
+    }
+}
+
+/// Draws the candidates of a step.
+fn fill(rng: &VesselRng, step: Step<'_>, vacancy: Option<&Vacancy>, blocks: &mut Blocks) {
+    let (tissue, count) = (step.tissue.at_step(step.number), step.settings.samples);
+    let needed = count.div_ceil(BLOCK) as usize;
+    if blocks.len() < needed {
+        blocks.resize_with(needed, Vec::new);
+    }
+    let (blocks, beyond) = blocks.split_at_mut(needed);
+    beyond.iter_mut().for_each(Vec::clear);
+    parallel::for_each(blocks, |index, block| {
+        let mut rng = rng.clone();
+        rng.set_word_pos((u128::from(step.number) << BLOCKS | index as u128) << STRETCH);
+        block.clear();
+        let count = BLOCK.min(count - index as u32 * BLOCK);
+        match vacancy {
+            Some(vacancy) => vacancy.draw(tissue, &mut rng, count, block),
+            None => tissue.draw(&mut rng, count, block),
         }
-        let (blocks, beyond) = self.blocks.split_at_mut(needed);
-        beyond.iter_mut().for_each(Vec::clear);
-        let rng = &self.rng;
-        parallel::for_each(blocks, |index, block| {
-            let mut rng = rng.clone();
-            rng.set_word_pos((u128::from(step) << BLOCKS | index as u128) << STRETCH);
-            block.clear();
-            let count = BLOCK.min(count - index as u32 * BLOCK);
-            match vacancy {
-                Some(vacancy) => vacancy.draw(tissue, &mut rng, count, block),
-                None => tissue.draw(&mut rng, count, block),
+        block.retain(|candidate| candidate.is_finite());
+    });
+}
+
+/// Candidates of coming steps, drawn on another thread. Whoever needs them doesn't wait for them.
+#[derive(Debug)]
+pub(crate) struct Ahead {
+    rng: VesselRng,
+    steps: u32,
+    ready: Mutex<Ready>,
+}
+
+/// Candidates that are ready. The lock on them is never held while any are drawn.
+#[derive(Debug, Default)]
+struct Ready {
+    /// The next step whose candidates will be asked for; 0 if none will.
+    next: u32,
+    /// Steps from then on, in order.
+    steps: VecDeque<(u32, Blocks)>,
+    spare: Vec<Blocks>,
+}
+
+impl Ahead {
+    /// Most steps that are drawn ahead.
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Whether so many steps are still to be drawn.
+    pub fn lacks(&self, steps: usize) -> bool {
+        let ready = self.ready();
+        ready.next > 0 && ready.steps.len() + steps <= self.steps as usize
+    }
+
+    /// Draws the first step that is not ready, unless enough are. `at` gives a step of a number.
+    pub fn draw_next<'a>(&self, at: impl Fn(u32) -> Step<'a>) -> bool {
+        let (step, mut blocks) = {
+            let mut ready = self.ready();
+            let number = ready.steps.back().map_or(ready.next, |(last, _)| last + 1);
+            let step = at(number);
+            if ready.next == 0 || number >= ready.next + self.steps || number > step.settings.steps {
+                return false;
             }
-            block.retain(|candidate| candidate.is_finite());
-        });
+            (step, ready.spare.pop().unwrap_or_default())
+        };
+        fill(&self.rng, step, None, &mut blocks);
+        let mut ready = self.ready();
+        let is_late = ready.next > step.number || ready.next == 0;
+        let follows = ready.steps.back().is_none_or(|(last, _)| last + 1 == step.number);
+        if is_late || !follows {
+            ready.spare.push(blocks);
+        } else {
+            ready.steps.push_back((step.number, blocks));
+        }
+        true
+    }
+
+    /// Takes the candidates of a step in exchange for old ones, if they are ready; and tells whether `more` of plain tissue
+    /// will be asked for.
+    fn take(&self, step: Step<'_>, more: bool, blocks: &mut Blocks) -> bool {
+        let mut ready = self.ready();
+        let Ready { next, steps, spare } = &mut *ready;
+        *next = if more { step.number + 1 } else { 0 };
+        while let Some((number, mut drawn)) = steps.pop_front() {
+            let is_it = more && number == step.number;
+            if is_it {
+                std::mem::swap(&mut drawn, blocks);
+            }
+            spare.push(drawn);
+            if is_it {
+                return true;
+            }
+            if number > step.number && more {
+                break;
+            }
+        }
+        false
+    }
+
+    fn ready(&self) -> MutexGuard<'_, Ready> {
+        self.ready.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

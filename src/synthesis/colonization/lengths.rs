@@ -8,7 +8,7 @@ use bevy_math::ops;
 use std::f32::consts::PI;
 
 /// One system's settings at the present size of the tissue.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Lengths {
     pub drain_birth: f32,
     pub node_birth: f32,

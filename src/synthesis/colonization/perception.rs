@@ -65,7 +65,7 @@ impl Search {
         self.asking.extend(drains.awake().iter().filter(|&&drain| drains.is_searching(drain)));
         let shared = &*drains;
         let find = |&drain: &u32| nearest_open(forest, lengths, shared.attraction(drain));
-        parallel::map_into(&self.asking, &mut self.found, Found::default(), find);
+        parallel::map_many_into(&self.asking, &mut self.found, Found::default(), find);
         for (&drain, &found) in self.asking.iter().zip(&self.found) {
             drains.settle(drain, found);
         }

@@ -97,7 +97,7 @@ struct Growing {
 }
 
 /// The forest and the drains of one system, with the lengths in force.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct SystemGrowth {
     pub forest: Forest,
     pub drains: Drains,
@@ -127,22 +127,7 @@ const FITTING_CELLS: Range<f32> = 0.6..1.5;
 impl SystemGrowth {
     /// A system without nodes or drains.
     pub fn new(settings: &SystemSettings, bounds: &Aabb3d) -> Self {
-        let lengths = Lengths::at_size(settings, 1.0);
-        let mut system = Self {
-            forest: Forest::default(),
-            drains: Drains::default(),
-            lengths,
-            size: 1.0,
-            settings: settings.clone(),
-            search: Search::default(),
-            pulls: Vec::new(),
-            pulled: Vec::new(),
-            growing: Vec::new(),
-            way: Vec::new(),
-            news: News::default(),
-            supplied: Vec::new(),
-            givers: Vec::new(),
-        };
+        let mut system = Self::default();
         system.restart(settings, bounds);
         system
     }
@@ -267,7 +252,7 @@ impl SystemGrowth {
             *end += len;
             Some(*end - len..*end)
         }));
-        parallel::map_into(pulled, growing, Growing::default(), |range| {
+        parallel::map_many_into(pulled, growing, Growing::default(), |range| {
             let pulls = &pulls[range.clone()];
             let node = pulls[0].node;
             let at = forest.point(node);
