@@ -32,7 +32,7 @@ pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWar
 
 use crate::synthesis::parallel;
 use crate::synthesis::roots::{RootError, Roots};
-use crate::synthesis::tissue::{Tissue, TissuePoint};
+use crate::synthesis::tissue::{Derived, Tissue, TissuePoint};
 use crate::synthesis::tree::{BedLink, ByKind, NodeId, VesselKind, VesselTree};
 use bevy_math::Vec3;
 use candidates::{Candidates, Draws};
@@ -87,6 +87,8 @@ pub struct Colonization {
     candidates: Candidates,
     vacancy: Vacancy,
     links: Vec<BedLink>,
+    /// What was derived from the tissue, if it keeps nothing itself.
+    derived: Derived,
 }
 
 impl Colonization {
@@ -104,7 +106,8 @@ impl Colonization {
         seed: u64,
     ) -> Result<Self, ColonizationError> {
         settings.validate()?;
-        let placed = Self::placed(tissue.as_ref(), &settings, roots, seed)?;
+        let derived = Derived::default();
+        let placed = Self::placed((tissue.as_ref(), &derived), &settings, roots, seed)?;
         let bounds = tissue.bounds();
         let systems = settings.systems().map(|(_, settings)| SystemGrowth::new(settings, &bounds));
         let mut growth = Self {
@@ -117,6 +120,7 @@ impl Colonization {
             candidates: Candidates::default(),
             vacancy: Vacancy::default(),
             links: Vec::new(),
+            derived,
         };
         growth.reset_vacancy();
         growth.plant(&placed, roots);
@@ -134,7 +138,7 @@ impl Colonization {
         seed: u64,
     ) -> Result<(), ColonizationError> {
         settings.validate()?;
-        let placed = Self::placed(self.tissue.as_ref(), &settings, roots, seed)?;
+        let placed = Self::placed((self.tissue.as_ref(), &self.derived), &settings, roots, seed)?;
         let bounds = self.tissue.bounds();
         for (system, (_, settings)) in self.systems.iter_mut().zip(settings.systems()) {
             system.restart(settings, &bounds);
@@ -149,12 +153,12 @@ impl Colonization {
     }
 
     fn placed(
-        tissue: &dyn Tissue,
+        (tissue, derived): (&dyn Tissue, &Derived),
         settings: &ColonizationSettings,
         roots: &Roots,
         seed: u64,
     ) -> Result<ByKind<Vec<TissuePoint>>, ColonizationError> {
-        let placed = roots.resolve(tissue, &settings.root_spacing(), seed)?;
+        let placed = roots.resolve_with(tissue, &settings.root_spacing(), seed, derived)?;
         for (kind, system) in settings.systems() {
             check_radii(kind, system, roots.given[kind].as_ref())?;
         }

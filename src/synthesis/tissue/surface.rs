@@ -9,7 +9,7 @@ use crate::synthesis::{
     pace::{Pace, at_once},
     random::{VesselRng, alias_table::AliasTable, many},
     tissue::{
-        Extent, Facet, Tissue, TissuePiece, TissuePoint,
+        Derived, Extent, Facet, Tissue, TissuePiece, TissuePoint,
         error::{TissueError, rounding_within},
         pieces,
     },
@@ -41,6 +41,7 @@ pub struct MeshSurface {
     bounds: Aabb3d,
     area: f32,
     tolerance: f32,
+    derived: Derived,
 }
 
 impl MeshSurface {
@@ -113,6 +114,7 @@ impl MeshSurface {
             tolerance: ((bounds.max - bounds.min).max_element() * SURFACE_TOLERANCE).max(rounding),
             bounds,
             indexed,
+            derived: Derived::default(),
         })
     }
 
@@ -182,6 +184,10 @@ impl MeshSurface {
 impl Tissue for MeshSurface {
     fn bounds(&self) -> Aabb3d {
         self.bounds
+    }
+
+    fn derived(&self) -> Option<&Derived> {
+        Some(&self.derived)
     }
 
     fn extent(&self) -> Extent {

@@ -83,15 +83,17 @@ impl<'a, const N: usize> Blockers<'a, N> {
         let cell = |x: &[UVec3; 2], y: &[UVec3; 2], z: &[UVec3; 2]| {
             ((x[0].x + y[0].y + z[0].z) as usize, (x[1].x + y[1].y + z[1].z) as usize % CELLS)
         };
-        let four = |z: &[UVec3; 2]| {
-            [cell(&low, &low, z), cell(&high, &low, z), cell(&low, &high, z), cell(&high, &high, z)]
-        };
+        let four =
+            |z: &[UVec3; 2]| [cell(&low, &low, z), cell(&high, &low, z), cell(&low, &high, z), cell(&high, &high, z)];
         let near = four(&low);
         if is_one_layer {
             return self.chains_reach(near, center);
         }
         let far = four(&high);
-        self.chains_reach(std::array::from_fn::<_, 8, _>(|index| if index < 4 { near[index] } else { far[index - 4] }), center)
+        self.chains_reach(
+            std::array::from_fn::<_, 8, _>(|index| if index < 4 { near[index] } else { far[index - 4] }),
+            center,
+        )
     }
 
     /// Whether a point of some cells lies within reach of a centre, one grid after the other.
