@@ -368,7 +368,7 @@ fn coverage_equals_brute_force() {
         let mut rng = Stream::Attraction.rng(seed);
         let samples: Vec<Vec3> =
             (0..400).map(|_| flatten(vec3(rng.random(), rng.random(), rng.random()) * 1.4)).collect();
-        for distance in [0.0, 0.05, 0.1, 0.3, 2.0] {
+        for distance in [0.0, 0.05, 0.1, 0.3, 2.0, 0.02] {
             let near = |s: &&Vec3| tree.positions().iter().any(|p| p.distance_squared(**s) <= distance * distance);
             let expected = samples.iter().filter(near).count() as f32 / 400.0;
             assert_eq!(coverage(&tree, &samples, distance), Some(expected), "seed {seed} distance {distance}");

@@ -29,6 +29,12 @@ impl Powers {
     #[inline]
     pub fn meet(&mut self, sum: f32) {
         let Some(whole) = whole(sum) else { return };
+        if let Some([own, next]) = self.kept.get(whole..whole + 2)
+            && *own > 0.0
+            && *next > 0.0
+        {
+            return;
+        }
         if whole + 1 >= self.kept.len() {
             self.kept.resize((whole + 2).next_power_of_two(), 0.0);
         }
