@@ -72,6 +72,27 @@ fn portions_of_steps_change_nothing() {
     }
 }
 
+/// A second thread that other work keeps busy for ever is not waited for.
+#[test]
+fn a_thread_that_never_comes_changes_nothing() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+    for case in tissues() {
+        let (free, wait) = std::sync::mpsc::channel::<()>();
+        let (here, is_here) = std::sync::mpsc::channel();
+        let case = &case;
+        let blocked = pool.install(move || {
+            rayon::spawn(move || {
+                here.send(()).expect("somebody to hear");
+                wait.recv().expect_err("nothing is sent");
+            });
+            is_here.recv().expect("the other thread takes the work");
+            grown(case, 7)
+        });
+        drop(free);
+        assert_eq!(blocked, grown(case, 7), "{}", case.name);
+    }
+}
+
 #[test]
 fn steps_after_the_last_change_nothing() {
     let case = &tissues()[0];

@@ -3,11 +3,11 @@
 //! Every block of every step has its own stretch of the random stream, so candidates don't depend on the thread or time
 //! of the draw.
 
-use super::step::Step;
 use super::vacancy::Vacancy;
 use crate::synthesis::parallel;
 use crate::synthesis::random::{Stream, VesselRng};
 use crate::synthesis::space::order::SpatialOrder;
+use crate::synthesis::tissue::Tissue;
 use bevy_math::{Vec3, bounding::Aabb3d};
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -28,6 +28,18 @@ pub(crate) struct Draws {
     rng: VesselRng,
     /// As many as any step needed; surplus ones are empty.
     blocks: Blocks,
+}
+
+/// Where the candidates of a step are drawn from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sampling<'a> {
+    /// The tissue in force.
+    pub tissue: &'a dyn Tissue,
+    /// Number of the step, from 1, and of the last one.
+    pub step: u32,
+    pub last: u32,
+    /// Number of candidates.
+    pub count: u32,
 }
 
 /// The candidates of a step, block by block.
@@ -51,17 +63,17 @@ impl Draws {
 
     /// Draws the candidates of a step, from vacant pieces if those are known. Those of plain tissue may have been drawn
     /// ahead.
-    pub fn draw(&mut self, step: Step<'_>, vacancy: Option<&Vacancy>, ahead: Option<&Ahead>) {
-        let is_ready = ahead.is_some_and(|ahead| ahead.take(step, vacancy.is_none(), &mut self.blocks));
+    pub fn draw(&mut self, of: Sampling<'_>, vacancy: Option<&Vacancy>, ahead: Option<&Ahead>) {
+        let is_ready = ahead.is_some_and(|ahead| ahead.take(of.step, vacancy.is_none(), &mut self.blocks));
         if !is_ready {
-            fill(&self.rng, step, vacancy, &mut self.blocks);
+            fill(&self.rng, of, vacancy, &mut self.blocks);
         }
     }
 }
 
 /// Draws the candidates of a step.
-fn fill(rng: &VesselRng, step: Step<'_>, vacancy: Option<&Vacancy>, blocks: &mut Blocks) {
-    let (tissue, count) = (step.tissue.at_step(step.number), step.settings.samples);
+fn fill(rng: &VesselRng, of: Sampling<'_>, vacancy: Option<&Vacancy>, blocks: &mut Blocks) {
+    let Sampling { tissue, step, count, .. } = of;
     let needed = count.div_ceil(BLOCK) as usize;
     if blocks.len() < needed {
         blocks.resize_with(needed, Vec::new);
@@ -70,7 +82,7 @@ fn fill(rng: &VesselRng, step: Step<'_>, vacancy: Option<&Vacancy>, blocks: &mut
     beyond.iter_mut().for_each(Vec::clear);
     parallel::for_each(blocks, |index, block| {
         let mut rng = rng.clone();
-        rng.set_word_pos((u128::from(step.number) << BLOCKS | index as u128) << STRETCH);
+        rng.set_word_pos((u128::from(step) << BLOCKS | index as u128) << STRETCH);
         block.clear();
         let count = BLOCK.min(count - index as u32 * BLOCK);
         match vacancy {
@@ -114,37 +126,37 @@ impl Ahead {
         ready.next > 0 && ready.steps.len() + steps <= self.steps as usize
     }
 
-    /// Draws the first step that is not ready, unless enough are. `at` gives a step of a number.
-    pub fn draw_next<'a>(&self, at: impl Fn(u32) -> Step<'a>) -> bool {
-        let (step, mut blocks) = {
+    /// Draws the first step that is not ready, unless enough are. `at` gives the one of a number.
+    pub fn draw_next<'a>(&self, at: impl Fn(u32) -> Sampling<'a>) -> bool {
+        let (of, mut blocks) = {
             let mut ready = self.ready();
             let number = ready.steps.back().map_or(ready.next, |(last, _)| last + 1);
-            let step = at(number);
-            if ready.next == 0 || number >= ready.next + self.steps || number > step.settings.steps {
+            let of = at(number);
+            if ready.next == 0 || number >= ready.next + self.steps || number > of.last {
                 return false;
             }
-            (step, ready.spare.pop().unwrap_or_default())
+            (of, ready.spare.pop().unwrap_or_default())
         };
-        fill(&self.rng, step, None, &mut blocks);
+        fill(&self.rng, of, None, &mut blocks);
         let mut ready = self.ready();
-        let is_late = ready.next > step.number || ready.next == 0;
-        let follows = ready.steps.back().is_none_or(|(last, _)| last + 1 == step.number);
+        let is_late = ready.next > of.step || ready.next == 0;
+        let follows = ready.steps.back().is_none_or(|(last, _)| last + 1 == of.step);
         if is_late || !follows {
             ready.spare.push(blocks);
         } else {
-            ready.steps.push_back((step.number, blocks));
+            ready.steps.push_back((of.step, blocks));
         }
         true
     }
 
     /// Takes the candidates of a step in exchange for old ones, if they are ready; and tells whether `more` of plain tissue
     /// will be asked for.
-    fn take(&self, step: Step<'_>, more: bool, blocks: &mut Blocks) -> bool {
+    fn take(&self, step: u32, more: bool, blocks: &mut Blocks) -> bool {
         let mut ready = self.ready();
         let Ready { next, steps, spare } = &mut *ready;
-        *next = if more { step.number + 1 } else { 0 };
+        *next = if more { step + 1 } else { 0 };
         while let Some((number, mut drawn)) = steps.pop_front() {
-            let is_it = more && number == step.number;
+            let is_it = more && number == step;
             if is_it {
                 std::mem::swap(&mut drawn, blocks);
             }
@@ -152,7 +164,7 @@ impl Ahead {
             if is_it {
                 return true;
             }
-            if number > step.number && more {
+            if number > step && more {
                 break;
             }
         }

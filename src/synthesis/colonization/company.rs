@@ -107,8 +107,8 @@ impl Company {
         if let Ok(mut veins) = self.veins.try_lock() {
             self.grow_veins(&mut veins);
         }
-        let number = |step: u32| Step { tissue: &*self.tissue, settings: &self.settings, number: step };
-        while !self.is_over.load(Ordering::Acquire) && self.ahead.draw_next(number) {}
+        let at = |number: u32| Step { tissue: &*self.tissue, settings: &self.settings, number }.sampling();
+        while !self.is_over.load(Ordering::Acquire) && self.ahead.draw_next(at) {}
         self.is_called.store(false, Ordering::Release);
     }
 

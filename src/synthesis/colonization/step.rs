@@ -1,6 +1,6 @@
 //! The parts of a step, in their order: candidates, arteries, veins.
 
-use super::candidates::{Ahead, Candidates, Draws};
+use super::candidates::{Ahead, Candidates, Draws, Sampling};
 use super::report::SystemReport;
 use super::settings::ColonizationSettings;
 use super::system_growth::{Ground, Supplied, SystemGrowth};
@@ -33,9 +33,15 @@ impl<'a> Step<'a> {
             let nodes = (forest.tree.positions(), |node, side| forest.supplies(node, side));
             vacancy.prepare(self.tissue, arteries.length_scale(), nodes, drains);
         }
-        draws.draw(self, vacancy.chosen(), ahead);
+        draws.draw(self.sampling(), vacancy.chosen(), ahead);
         let ground = self.ground();
         candidates.take(draws, &self.tissue.bounds(), |some, refused| arteries.refuse(some, ground, refused));
+    }
+
+    /// Where its candidates are drawn from.
+    pub fn sampling(self) -> Sampling<'a> {
+        let Self { tissue, settings, number } = self;
+        Sampling { tissue: tissue.at_step(number), step: number, last: settings.steps, count: settings.samples }
     }
 
     /// Makes candidates in unsupplied tissue drains, and grows the arteries towards them. Returns the number of drains

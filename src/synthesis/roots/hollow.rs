@@ -5,10 +5,7 @@
 //! from the tissue lies in the mouth of the deepest hollow. The tissue nearest to the middle of the outer midpoints around
 //! it is the floor.
 
-use crate::synthesis::{
-    random::Stream,
-    tissue::{Tissue, TissuePoint},
-};
+use crate::synthesis::{random::Stream, tissue::Tissue};
 use bevy_math::Vec3;
 use rand::RngExt;
 
@@ -22,14 +19,14 @@ const ROUNDS: u32 = 8;
 const LEAST_DEPTH: f32 = 0.02;
 
 /// The floor of the deepest hollow; `None` if there is none. `diameter` is the tissue's equivalent one.
-pub(super) fn hilum(tissue: &dyn Tissue, samples: &[TissuePoint], diameter: f32) -> Option<TissuePoint> {
+pub(super) fn hilum(tissue: &dyn Tissue, samples: &[Vec3], diameter: f32) -> Option<Vec3> {
     if samples.is_empty() {
         return None;
     }
     let mut rng = Stream::Tissue.rng(1);
     let mut outer: Vec<(Vec3, f32)> = Vec::new();
     for _ in 0..PAIRS {
-        let [a, b] = [(); 2].map(|()| samples[rng.random_range(0..samples.len())].position);
+        let [a, b] = [(); 2].map(|()| samples[rng.random_range(0..samples.len())]);
         let middle = a.midpoint(b);
         let closest = tissue.closest_point(middle);
         let way = middle - closest.position;
@@ -48,5 +45,5 @@ pub(super) fn hilum(tissue: &dyn Tissue, samples: &[TissuePoint], diameter: f32)
             middle = sum / weights;
         }
     }
-    Some(tissue.closest_point(middle))
+    Some(tissue.closest_point(middle).position)
 }

@@ -9,7 +9,7 @@ use super::{
 use crate::synthesis::{
     mesh::is_usable,
     random::Stream,
-    tissue::{Derived, Tissue, TissuePoint},
+    tissue::{Derived, Tissue, TissuePoint, web::web},
     tree::{ByKind, VesselKind},
 };
 use bevy_math::Vec3;
@@ -58,8 +58,9 @@ impl Roots {
                 RootPlacement::None => Vec::new(),
                 RootPlacement::Spread(count) => spread(tissue, kind, *count, &mut rng)?,
                 RootPlacement::Hilum => {
-                    match derived.hilum(diameter, || hilum(tissue, &derived.web(tissue).samples, diameter)) {
-                        Some(floor) => vec![floor],
+                    let find = || hilum(tissue, &web(tissue, derived).positions, diameter);
+                    match derived.hilum(diameter, find) {
+                        Some(floor) => vec![tissue.closest_point(floor)],
                         None => spread(tissue, kind, 1, &mut rng)?,
                     }
                 }
@@ -67,7 +68,7 @@ impl Roots {
                     check_reach(kind, *reach)?;
                     match tissue.entrance() {
                         Some(position) => vec![TissuePoint { position, ..tissue.closest_point(position) }],
-                        None => within(derived.web(tissue), kind, reach * diameter, own.reach, &mut rng)?,
+                        None => within((tissue, web(tissue, derived)), kind, reach * diameter, own.reach, &mut rng)?,
                     }
                 }
                 RootPlacement::Beside => {

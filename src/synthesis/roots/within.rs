@@ -6,10 +6,7 @@
 use super::RootError;
 use crate::synthesis::{
     random::VesselRng,
-    tissue::{
-        TissuePoint,
-        web::{FACING, Links, Web},
-    },
+    tissue::{Links, Tissue, TissuePoint, Web, web::FACING},
     tree::VesselKind,
 };
 use rand::RngExt;
@@ -28,35 +25,40 @@ const SPARED: usize = 200;
 /// The sample that the seed chooses is the root if it reaches everything, else the first one after it that does. If none
 /// does, the first stays, and the sample furthest from all roots is added repeatedly, until all are near enough.
 pub(super) fn within(
-    web: &Web,
+    (tissue, web): (&dyn Tissue, &Web),
     kind: VesselKind,
     way: f32,
     reach: f32,
     rng: &mut VesselRng,
 ) -> Result<Vec<TissuePoint>, RootError> {
-    if web.samples.is_empty() {
+    if web.positions.is_empty() {
         return Err(RootError::NoRoom { kind, wanted: 1, found: 0 });
     }
-    let start = rng.random_range(0..web.samples.len() as u32);
+    let start = rng.random_range(0..web.positions.len() as u32);
     let centers = Ways { links: parted_at_rims(web, reach) }.centers(start, way);
-    Ok(centers.into_iter().map(|center| web.samples[center as usize]).collect())
+    let place = |center: u32| {
+        let position = web.positions[center as usize];
+        TissuePoint { position, ..tissue.closest_point(position) }
+    };
+    Ok(centers.into_iter().map(place).collect())
 }
 
 /// The links of a web, with each sample on the rim of a wall joined to one side of it only. Vessels on one side supply much
 /// of the rim of a wall that is thinner than `reach`, and then little draws them round it.
 fn parted_at_rims(web: &Web, reach: f32) -> Links {
     let mut links = web.links.clone();
-    let at = |sample: u32| &web.samples[sample as usize];
+    let position = |sample: u32| web.positions[sample as usize];
+    let normal = |sample: u32| web.normals[sample as usize];
     let mut others = Vec::new();
     for rim in 0..links.len() as u32 {
         let near = links
             .of(rim)
             .iter()
             .filter(|link| link.length.is_finite())
-            .map(|link| (at(rim).position.distance(at(link.to).position), link.to));
+            .map(|link| (position(rim).distance(position(link.to)), link.to));
         let near = near.filter(|&(distance, _)| distance < reach);
         let Some((_, side)) = near.clone().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))) else { continue };
-        let is_behind = |other: u32| at(side).normal.dot(at(other).normal) < -FACING;
+        let is_behind = |other: u32| normal(side).dot(normal(other)) < -FACING;
         others.clear();
         others.extend(near.map(|(_, other)| other).filter(|&other| is_behind(other)));
         others.iter().for_each(|&other| links.cut(rim, other));

@@ -19,6 +19,7 @@
 //! times.
 
 pub mod density;
+mod derived;
 mod error;
 pub mod growth;
 pub mod mask;
@@ -36,6 +37,8 @@ pub mod volume;
 pub(crate) mod web;
 
 pub use density::{DensityField, DensityTissue};
+pub use derived::Derived;
+pub(crate) use derived::{Links, Web};
 pub use error::TissueError;
 pub use growth::TissueGrowth;
 pub use mask::Mask;
@@ -51,7 +54,6 @@ pub use source::{
 pub use staged::Staged;
 pub use surface::MeshSurface;
 pub use volume::MeshVolume;
-pub use web::Derived;
 
 use crate::synthesis::random::VesselRng;
 use bevy_math::{Vec3, bounding::Aabb3d};

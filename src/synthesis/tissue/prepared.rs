@@ -1,6 +1,8 @@
 //! A tissue with all slow preparation done, so that paint can be laid over it any number of times.
 
-use super::{DensityField, DensityTissue, GuidePath, NoGoField, NoGoTissue, Staged, Tissue, TissueError, TissuePaint};
+use super::{
+    DensityField, DensityTissue, GuidePath, NoGoField, NoGoTissue, Staged, Tissue, TissueError, TissuePaint, web,
+};
 use crate::synthesis::{
     mesh::{IndexedMesh, TriangleMesh},
     pace::{Pace, at_once},
@@ -159,7 +161,7 @@ fn thinned(tissue: Arc<dyn Tissue>, density: Option<&DensityField>) -> Result<Ar
 async fn derive(tissue: &dyn Tissue, pace: &Pace) {
     let first = tissue.at_step(1);
     if let Some(derived) = first.derived().filter(|_| first.entrance().is_none()) {
-        derived.prepare(first, pace).await;
+        web::prepare(first, derived, pace).await;
     }
     pace.rest(1.0).await;
 }
