@@ -73,6 +73,7 @@ fn portions_of_steps_change_nothing() {
 }
 
 /// A second thread that other work keeps busy for ever is not waited for.
+#[cfg(feature = "parallel")]
 #[test]
 fn a_thread_that_never_comes_changes_nothing() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");

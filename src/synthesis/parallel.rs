@@ -8,6 +8,7 @@ const WORTH_WAKING: usize = 2048;
 #[cfg(feature = "parallel")]
 mod threads {
     use rayon::Yield;
+    use std::cell::Cell;
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     use std::sync::{Mutex, PoisonError};
 
@@ -17,9 +18,31 @@ mod threads {
     /// Waking takes nearly as long.
     const PATIENCE: usize = 4096;
 
+    thread_local! {
+        /// Whether this thread shares no work for now.
+        static ALONE: Cell<bool> = const { Cell::new(false) };
+    }
+
+    /// Number of threads to share work with, this one included.
+    pub fn count() -> usize {
+        if ALONE.get() { 1 } else { rayon::current_num_threads() }
+    }
+
+    /// Does some work without sharing it.
+    pub fn alone<R>(act: impl FnOnce() -> R) -> R {
+        struct Before(bool);
+        impl Drop for Before {
+            fn drop(&mut self) {
+                ALONE.set(self.0);
+            }
+        }
+        let _before = Before(ALONE.replace(true));
+        act()
+    }
+
     /// Number of items that a thread takes at a time; `None` if they are not worth sharing.
     pub fn share_of(items: usize, least: usize) -> Option<usize> {
-        let threads = rayon::current_num_threads();
+        let threads = count();
         (threads > 1 && items >= 2 * least).then(|| items.div_ceil(SHARES * threads).max(least.div_ceil(4)))
     }
 
@@ -85,7 +108,7 @@ mod threads {
 /// Calls `act` for every item and its index. Each item is worth a thread of its own.
 pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + Sync) {
     #[cfg(feature = "parallel")]
-    if items.len() > 1 && rayon::current_num_threads() > 1 {
+    if items.len() > 1 && threads::count() > 1 {
         threads::take_turns(items.len(), items.iter_mut().enumerate(), |(index, item)| act(index, item));
         return;
     }
@@ -96,7 +119,7 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + S
 /// each time would take as long as a step.
 pub(crate) fn with_company<R: Send>(act: impl FnOnce() -> R + Send) -> R {
     #[cfg(feature = "parallel")]
-    if rayon::current_num_threads() > 1 {
+    if threads::count() > 1 {
         let over = threads::Over::default();
         return rayon::join(|| over.after(act), || over.stand_by()).0;
     }
@@ -107,7 +130,7 @@ pub(crate) fn with_company<R: Send>(act: impl FnOnce() -> R + Send) -> R {
 #[cfg_attr(not(feature = "parallel"), expect(unused_variables, reason = "there is no other thread"))]
 pub(crate) fn beside(act: impl FnOnce() + Send + 'static) -> bool {
     #[cfg(feature = "parallel")]
-    if rayon::current_num_threads() > 1 {
+    if threads::count() > 1 {
         use std::panic::{AssertUnwindSafe, catch_unwind};
         rayon::spawn(|| _ = catch_unwind(AssertUnwindSafe(act)));
         return true;
@@ -115,10 +138,18 @@ pub(crate) fn beside(act: impl FnOnce() + Send + 'static) -> bool {
     false
 }
 
+/// Does work that shares nothing, such as while it holds a lock: a thread that waits for others may take up any other work,
+/// and that may wait for the same lock.
+pub(crate) fn alone<R>(act: impl FnOnce() -> R) -> R {
+    #[cfg(feature = "parallel")]
+    let act = || threads::alone(act);
+    act()
+}
+
 /// Does work on a thread that shares with others at once, if there are others.
 pub(crate) fn within_pool<R: Send>(act: impl FnOnce() -> R + Send) -> R {
     #[cfg(feature = "parallel")]
-    if rayon::current_num_threads() > 1 && rayon::current_thread_index().is_none() {
+    if threads::count() > 1 && rayon::current_thread_index().is_none() {
         return rayon::join(act, || ()).0;
     }
     act()
@@ -204,6 +235,7 @@ mod tests {
                 assert!(outputs.iter().zip(&inputs).all(|(&output, &input)| output == 2 * input));
                 assert!(counts.iter().enumerate().all(|(index, &count)| count == 20 * index as u32));
                 assert_eq!(within_pool(|| 1), 1);
+                assert!(!alone(|| beside(|| ())));
             });
         }
     }

@@ -122,7 +122,9 @@ impl Company {
                 number
             };
             let step = Step { tissue: &*self.tissue, settings: &self.settings, number };
-            let report = step.grow_veins(&mut veins.growth, &veins.taken, &mut veins.links);
+            let Veins { growth, links, taken, .. } = veins;
+            // The veins are locked.
+            let report = parallel::alone(|| step.grow_veins(growth, taken, links));
             veins.grew = report.new_nodes > 0;
         }
     }
