@@ -76,30 +76,36 @@ impl Ways {
         let count = self.links.len() as u32;
         let spared = self.links.len() / SPARED;
         let missed = |distances: &[f32]| distances.iter().filter(|&&distance| distance > way).count();
-        let from = |sample| {
+        let from = |sample, limit| {
             let mut distances = vec![f32::INFINITY; self.links.len()];
-            self.approach(sample, &mut distances);
+            self.approach(sample, &mut distances, limit);
             distances
         };
-        let mut distances = from(start);
+        let mut distances = from(start, f32::INFINITY);
         if missed(&distances) <= spared {
             return vec![start];
         }
+        // From another sample, nothing is nearer by more than the way to that sample.
+        let surely_misses = |sample: u32| {
+            let gain = distances[sample as usize];
+            distances.iter().filter(|&&distance| distance - gain > way).count() > spared
+        };
         let mut tries = (1..TRIES.min(count)).map(|offset| (start + offset) % count);
-        if let Some(center) = tries.find(|&sample| missed(&from(sample)) <= spared) {
+        let reaches_all = |&sample: &u32| !surely_misses(sample) && missed(&from(sample, way)) <= spared;
+        if let Some(center) = tries.find(reaches_all) {
             return vec![center];
         }
         let mut chosen = vec![start];
         while distances.iter().filter(|&&distance| distance > SHARE_OF_SEVERAL * way).count() > spared {
             let furthest = furthest(&distances);
             chosen.push(furthest);
-            self.approach(furthest, &mut distances);
+            self.approach(furthest, &mut distances, f32::INFINITY);
         }
         chosen
     }
 
-    /// Lowers the distances from the nearest root after adding another root (Dijkstra 1959).
-    fn approach(&self, root: u32, distances: &mut [f32]) {
+    /// Lowers the distances from the nearest root after adding another root (Dijkstra 1959). Those above a limit stay.
+    fn approach(&self, root: u32, distances: &mut [f32], limit: f32) {
         distances[root as usize] = 0.0;
         // Distances are not negative, so their bits have the same order.
         let mut waiting = BinaryHeap::from([Reverse((0.0f32.to_bits(), root))]);
@@ -109,9 +115,9 @@ impl Ways {
                 continue;
             }
             for link in self.links.of(sample) {
-                let known = &mut distances[link.to as usize];
-                if distance + link.length < *known {
-                    *known = distance + link.length;
+                let (known, length) = (&mut distances[link.to as usize], distance + link.length);
+                if length < *known && length <= limit {
+                    *known = length;
                     waiting.push(Reverse((known.to_bits(), link.to)));
                 }
             }

@@ -325,7 +325,7 @@ fn nodes_within(tree: &VesselTree, distance: f32) -> PointGrid {
     let finite = || tree.positions().iter().copied().filter(|position| position.is_finite()).map(Vec3A::from);
     let min = finite().reduce(Vec3A::min).unwrap_or_default();
     let max = finite().reduce(Vec3A::max).unwrap_or_default();
-    // Much more cells than nodes would only take memory.
+    // Many more cells than nodes would only take memory.
     let coarse = (max - min).max_element() / (2.0 * ops::cbrt(tree.len() as f32));
     let cell = (PointGrid::CELL * distance.abs()).max(0.1 * coarse);
     let mut index = PointGrid::new(&Aabb3d { min, max }, cell);
