@@ -200,6 +200,7 @@ fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
         (PresetName::Paper, Arc::new(Disc::flat(0.5)?), None, 0x96bc_9ec1_951a_5766),
         (PresetName::Colon, Arc::new(MeshSurface::new(outer)?), colon_roots, 0xd6d7_a3e1_26c9_4a6c),
     ];
+    let mut changed = Vec::new();
     for (name, tissue, roots, expected) in cases {
         let preset = name.load();
         let generator = preset.generator_for(tissue.extent());
@@ -207,7 +208,10 @@ fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
         let roots = roots.map_or_else(|| preset.roots(), Roots::from);
         let mut growth = Colonization::new(tissue, settings, &roots, 0)?;
         growth.run();
-        assert_eq!(hash(&growth), expected, "{name}: {:#018x}", hash(&growth));
+        if hash(&growth) != expected {
+            changed.push(format!("{name}: {:#018x}", hash(&growth)));
+        }
     }
+    assert!(changed.is_empty(), "{changed:?}");
     Ok(())
 }

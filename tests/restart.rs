@@ -13,7 +13,7 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-/// A disc that counts the questions to it, and may keep what is derived from it.
+/// A disc that counts the questions to it but for samples, and may keep what is derived from it.
 #[derive(Debug)]
 struct Counting {
     disc: Disc,
@@ -56,7 +56,6 @@ impl Tissue for Counting {
     }
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
-        self.count();
         self.disc.sample(rng)
     }
 

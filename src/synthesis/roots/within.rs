@@ -1,15 +1,17 @@
 //! As many roots as a tissue needs: one in a compact organ, several in a long one.
 //!
 //! In: the [web](crate::synthesis::tissue) over a tissue, and the distance along it that the vessels of one root reach. Out:
-//! roots that together reach all of it. The web is the same for all seeds: the seed chooses where on it the search begins.
+//! roots that together reach all of it. The web is the same for all seeds: the seed chooses where the search begins.
 
 use super::RootError;
 use crate::synthesis::{
     random::VesselRng,
-    tissue::{Links, Tissue, TissuePoint, Web, web::FACING},
+    tissue::{
+        Links, Tissue, TissuePoint, Web,
+        web::{FACING, SAMPLES, draw},
+    },
     tree::VesselKind,
 };
-use rand::RngExt;
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 /// Reach of one of several roots, as a share of that of a single one: a tissue that needs several is narrow, and
@@ -22,8 +24,8 @@ const SPARED: usize = 200;
 
 /// Finds roots such that all tissue is within `way` of one, along the tissue. Vessels perceive tissue within `reach`.
 ///
-/// The sample that the seed chooses is the root if it reaches everything, else the first one after it that does. If none
-/// does, the first stays, and the sample furthest from all roots is added repeatedly, until all are near enough.
+/// The seed's first sample is the root if it reaches everything, else the first sample of the web after it that does. If
+/// none does, the first stays, and the sample furthest from all roots is added repeatedly, until all are near enough.
 pub(super) fn within(
     (tissue, web): (&dyn Tissue, &Web),
     kind: VesselKind,
@@ -31,16 +33,30 @@ pub(super) fn within(
     reach: f32,
     rng: &mut VesselRng,
 ) -> Result<Vec<TissuePoint>, RootError> {
-    if web.positions.is_empty() {
+    let Some((own, start)) = draw(tissue, SAMPLES, rng).first().and_then(|&own| {
+        let own = TissuePoint { position: own, ..tissue.closest_point(own) };
+        Some((own, nearest(web, &own)?))
+    }) else {
         return Err(RootError::NoRoom { kind, wanted: 1, found: 0 });
-    }
-    let start = rng.random_range(0..web.positions.len() as u32);
-    let centers = Ways { links: parted_at_rims(web, reach) }.centers(start, way);
+    };
     let place = |center: u32| {
         let position = web.positions[center as usize];
-        TissuePoint { position, ..tissue.closest_point(position) }
+        if center == start { own } else { TissuePoint { position, ..tissue.closest_point(position) } }
     };
+    let centers = Ways { links: parted_at_rims(web, reach) }.centers(start, way);
     Ok(centers.into_iter().map(place).collect())
+}
+
+/// The sample of a web that is nearest to a point, if possible on the same side of a wall.
+fn nearest(web: &Web, point: &TissuePoint) -> Option<u32> {
+    let key = |sample: u32| {
+        let (position, normal) = (web.positions[sample as usize], web.normals[sample as usize]);
+        (normal.dot(point.normal) < 0.0, position.distance_squared(point.position))
+    };
+    (0..web.positions.len() as u32).min_by(|&a, &b| {
+        let (a, b) = (key(a), key(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    })
 }
 
 /// The links of a web, with each sample on the rim of a wall joined to one side of it only. Vessels on one side supply much
