@@ -101,24 +101,18 @@ fn batch(criterion: &mut Criterion) {
         Colonization::KINDS.map(|kind| growth.grown(kind).tree.clone())
     };
     let reach = 1.0 / 3.0 * SystemSettings::DEFAULT_NODE_BIRTH_DISTANCE;
-    alone(|| {
-        group.bench_function("50 discs", |bencher| {
-            bencher.iter(|| (0..50).map(|seed| grow(seed)[0].len()).sum::<usize>());
-        });
-        group.bench_function("50 discs with statistics", |bencher| {
-            let measure = |tree: &VesselTree| {
-                let outside = statistics::outside(tree, |node| case.tissue.contains(node));
-                black_box((tree.statistics(), statistics::coverage(tree, &points, reach), outside));
-            };
-            bencher.iter(|| (0..50).for_each(|seed| grow(seed).iter().for_each(measure)));
-        });
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    group.bench_function("50 discs", |bencher| {
+        pool.install(|| bencher.iter(|| (0..50).map(|seed| grow(seed)[0].len()).sum::<usize>()));
+    });
+    group.bench_function("50 discs with statistics", |bencher| {
+        let measure = |tree: &VesselTree| {
+            let outside = statistics::outside(tree, |node| case.tissue.contains(node));
+            black_box((tree.statistics(), statistics::coverage(tree, &points, reach), outside));
+        };
+        pool.install(|| bencher.iter(|| (0..50).for_each(|seed| grow(seed).iter().for_each(measure))));
     });
     group.finish();
-}
-
-/// Runs on a pool of one thread.
-fn alone(act: impl FnOnce() + Send) {
-    rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread").install(act);
 }
 
 /// Growth on one thread and on two, beside other work that keeps all processors but one busy. To see what two threads do

@@ -108,7 +108,11 @@ impl Company {
             self.grow_veins(&mut veins);
         }
         let at = |number: u32| Step { tissue: &*self.tissue, settings: &self.settings, number }.sampling();
-        while !self.is_over.load(Ordering::Acquire) && self.ahead.draw_next(at) {}
+        while !self.is_over.load(Ordering::Acquire) {
+            if !self.ahead.draw_next(at) {
+                break;
+            }
+        }
         self.is_called.store(false, Ordering::Release);
     }
 
