@@ -5,17 +5,29 @@
 
 use bevy_math::{Vec3, bounding::Aabb3d};
 use bevy_vessels::synthesis::{
-    colonization::{Colonization, ColonizationSettings},
+    colonization::{Colonization, ColonizationSettings, SystemSettings},
     io::load_mesh,
     preset::PresetName,
     random::Stream,
     roots::{RootPlacement, Roots},
     space::point_grid::PointGrid,
     tissue::{Ball, Disc, MeshSurface, Tissue},
+    tree::{VesselTree, statistics},
 };
-use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{
+    BatchSize, BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main,
+    measurement::WallTime,
+};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use std::{hint::black_box, path::Path, sync::Arc};
+use std::{
+    hint::black_box,
+    num::NonZero,
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+};
 
 /// A growth to measure: a tissue, settings that fit it, and roots.
 struct Case {
@@ -70,12 +82,98 @@ fn reference(criterion: &mut Criterion) {
         ("ball, arteries and veins", Case::ball()),
         ("paper's settings on the disc", Case::disc(PresetName::Paper)),
     ] {
-        for threads in [1, 2] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            group.bench_function(BenchmarkId::new(name, format!("{threads} threads")), |bencher| {
-                pool.install(|| bencher.iter_batched_ref(|| case.growth(), Colonization::run, BatchSize::LargeInput));
+        on_threads(&mut group, name, &case);
+    }
+    group.finish();
+}
+
+/// Fifty discs, as a batch grows them: growth alone, and with all statistics.
+fn batch(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("batch");
+    group.sample_size(10);
+    let case = Case::disc(PresetName::ReferenceDisc);
+    let mut growth = case.growth();
+    let mut points = Vec::new();
+    case.tissue.draw(&mut Stream::Statistics.rng(0), 20_000, &mut points);
+    let mut grow = |seed: u64| {
+        growth.restart(case.settings.clone(), &case.roots, seed).expect("valid settings");
+        growth.run();
+        Colonization::KINDS.map(|kind| growth.grown(kind).tree.clone())
+    };
+    let reach = 1.0 / 3.0 * SystemSettings::DEFAULT_NODE_BIRTH_DISTANCE;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    group.bench_function("50 discs", |bencher| {
+        pool.install(|| bencher.iter(|| (0..50).map(|seed| grow(seed)[0].len()).sum::<usize>()));
+    });
+    group.bench_function("50 discs with statistics", |bencher| {
+        let measure = |tree: &VesselTree| {
+            let outside = statistics::outside(tree, |node| case.tissue.contains(node));
+            black_box((tree.statistics(), statistics::coverage(tree, &points, reach), outside));
+        };
+        pool.install(|| bencher.iter(|| (0..50).for_each(|seed| grow(seed).iter().for_each(measure))));
+    });
+    group.finish();
+}
+
+/// Growth on one thread and on two, beside other work that keeps all processors but one busy. To see what two threads do
+/// then, pin the benchmark to two processors, such as with `taskset --cpu-list 0,1`.
+fn busy(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("busy");
+    let stop = AtomicBool::new(false);
+    let others = std::thread::available_parallelism().map_or(1, NonZero::get).saturating_sub(1).max(1);
+    std::thread::scope(|scope| {
+        for _ in 0..others {
+            scope.spawn(|| {
+                while !stop.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
             });
         }
+        for (name, case) in [
+            ("disc, arteries and veins", Case::disc(PresetName::ReferenceDisc)),
+            ("ball, arteries", Case::ball().arteries_only()),
+            ("ball, arteries and veins", Case::ball()),
+        ] {
+            on_threads(&mut group, name, &case);
+        }
+        stop.store(true, Ordering::Relaxed);
+    });
+    group.finish();
+}
+
+/// Measures a growth on one thread and on two.
+fn on_threads(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, case: &Case) {
+    for threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        group.bench_function(BenchmarkId::new(name, format!("{threads} threads")), |bencher| {
+            pool.install(|| bencher.iter_batched_ref(|| case.growth(), Colonization::run, BatchSize::LargeInput));
+        });
+    }
+}
+
+/// The start of a growth up to its first step, with another seed on the same tissue each time.
+fn start(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("start");
+    group.sample_size(10);
+    let organs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/organs");
+    for (organ, preset) in [("colon_vhf.glb", PresetName::Colon), ("kidney_left_vhf.glb", PresetName::Kidney)] {
+        let Ok(mesh) = load_mesh(&organs.join(organ)) else {
+            println!("no {organ} in {}; its case is left out", organs.display());
+            continue;
+        };
+        let surface = MeshSurface::new(mesh).expect("an organ of ordinary size");
+        group.bench_function(BenchmarkId::new(organ, "first"), |bencher| {
+            let fresh = || Case::new(Arc::new(MeshSurface::new(surface.mesh().clone()).expect("as before")), preset);
+            bencher.iter_batched(fresh, |case| case.growth(), BatchSize::LargeInput);
+        });
+        let case = Case::new(Arc::new(surface), preset);
+        group.bench_function(BenchmarkId::new(organ, "again, another seed"), |bencher| {
+            let (mut growth, mut seed) = (case.growth(), 0);
+            bencher.iter(|| {
+                seed += 1;
+                growth.restart(case.settings.clone(), &case.roots, seed).expect("valid settings");
+            });
+        });
     }
     group.finish();
 }
@@ -107,12 +205,7 @@ fn scale(criterion: &mut Criterion) {
         let mut grown = case.growth();
         grown.run();
         group.throughput(Throughput::Elements(nodes(&grown) as u64));
-        for threads in [1, 2] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            group.bench_function(BenchmarkId::new(name, format!("{threads} threads")), |bencher| {
-                pool.install(|| bencher.iter_batched_ref(|| case.growth(), Colonization::run, BatchSize::LargeInput));
-            });
-        }
+        on_threads(&mut group, name, &case);
     }
     group.finish();
 }
@@ -158,5 +251,5 @@ fn index(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, reference, scale, index);
+criterion_group!(benches, reference, batch, busy, start, scale, index);
 criterion_main!(benches);

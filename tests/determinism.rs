@@ -72,6 +72,28 @@ fn portions_of_steps_change_nothing() {
     }
 }
 
+/// A second thread that other work keeps busy for ever is not waited for.
+#[cfg(feature = "parallel")]
+#[test]
+fn a_thread_that_never_comes_changes_nothing() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+    for case in tissues() {
+        let (free, wait) = std::sync::mpsc::channel::<()>();
+        let (here, is_here) = std::sync::mpsc::channel();
+        let case = &case;
+        let blocked = pool.install(move || {
+            rayon::spawn(move || {
+                here.send(()).expect("somebody to hear");
+                wait.recv().expect_err("nothing is sent");
+            });
+            is_here.recv().expect("the other thread takes the work");
+            grown(case, 7)
+        });
+        drop(free);
+        assert_eq!(blocked, grown(case, 7), "{}", case.name);
+    }
+}
+
 #[test]
 fn steps_after_the_last_change_nothing() {
     let case = &tissues()[0];
@@ -173,11 +195,12 @@ fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
     let (artery, vein) = (beside(&colon.roots.arterial), beside(&colon.roots.venous));
     let colon_roots = Some(RootPlacements { artery, vein, ..RootPlacements::default() });
     let cases: [(PresetName, Arc<dyn Tissue>, _, u64); 4] = [
-        (PresetName::ReferenceDisc, Arc::new(Disc::flat(0.5)?), None, 0x42fc_d56c_82cf_1345),
-        (PresetName::ReferenceBall, Arc::new(Ball::new(Vec3::ZERO, 0.5)?), None, 0x2b2b_c0bc_618a_8157),
-        (PresetName::Paper, Arc::new(Disc::flat(0.5)?), None, 0x96bc_9ec1_951a_5766),
-        (PresetName::Colon, Arc::new(MeshSurface::new(outer)?), colon_roots, 0xd6d7_a3e1_26c9_4a6c),
+        (PresetName::ReferenceDisc, Arc::new(Disc::flat(0.5)?), None, 0x8eb0_b115_be09_6464),
+        (PresetName::ReferenceBall, Arc::new(Ball::new(Vec3::ZERO, 0.5)?), None, 0x345e_e03e_8ef1_4a58),
+        (PresetName::Paper, Arc::new(Disc::flat(0.5)?), None, 0xeb55_719c_9c4c_dea3),
+        (PresetName::Colon, Arc::new(MeshSurface::new(outer)?), colon_roots, 0x66fb_4d7d_776d_1a1b),
     ];
+    let mut changed = Vec::new();
     for (name, tissue, roots, expected) in cases {
         let preset = name.load();
         let generator = preset.generator_for(tissue.extent());
@@ -185,7 +208,10 @@ fn known_growths_come_out_as_ever() -> Result<(), Box<dyn std::error::Error>> {
         let roots = roots.map_or_else(|| preset.roots(), Roots::from);
         let mut growth = Colonization::new(tissue, settings, &roots, 0)?;
         growth.run();
-        assert_eq!(hash(&growth), expected, "{name}: {:#018x}", hash(&growth));
+        if hash(&growth) != expected {
+            changed.push(format!("{name}: {:#018x}", hash(&growth)));
+        }
     }
+    assert!(changed.is_empty(), "{changed:?}");
     Ok(())
 }

@@ -368,7 +368,7 @@ fn coverage_equals_brute_force() {
         let mut rng = Stream::Attraction.rng(seed);
         let samples: Vec<Vec3> =
             (0..400).map(|_| flatten(vec3(rng.random(), rng.random(), rng.random()) * 1.4)).collect();
-        for distance in [0.0, 0.05, 0.1, 0.3, 2.0] {
+        for distance in [0.0, 0.05, 0.1, 0.3, 2.0, 0.02] {
             let near = |s: &&Vec3| tree.positions().iter().any(|p| p.distance_squared(**s) <= distance * distance);
             let expected = samples.iter().filter(near).count() as f32 / 400.0;
             assert_eq!(coverage(&tree, &samples, distance), Some(expected), "seed {seed} distance {distance}");
@@ -382,6 +382,10 @@ fn coverage_without_samples_or_nodes_and_with_duplicates() {
     assert_eq!(coverage(&same, &[], 1.0), None);
     assert_eq!(coverage(&VesselTree::new(), &[Vec3::ONE], 1.0), Some(0.0));
     assert_eq!(coverage(&same, &[Vec3::ONE, Vec3::ZERO, Vec3::NAN, Vec3::INFINITY], 0.5), Some(0.25));
+    assert_eq!(coverage(&same, &[Vec3::ZERO, Vec3::NAN, Vec3::INFINITY], f32::INFINITY), Some(1.0 / 3.0));
+    assert_eq!(coverage(&same, &[Vec3::ONE], f32::NAN), Some(0.0));
+    let far = tree(vec![Vec3::ZERO, Vec3::splat(1e6)], vec![NO_PARENT; 2], vec![1.0; 2]);
+    assert_eq!(coverage(&far, &[Vec3::ZERO, Vec3::X * 1e-3, Vec3::splat(1e6), Vec3::ONE], 2e-3), Some(0.75));
     assert_eq!(outside(&same, |_| false), 300);
     assert_eq!(outside(&symmetric(1, 90.0), |p| p.y >= 0.0), 1);
 }

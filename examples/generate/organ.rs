@@ -2,7 +2,7 @@
 
 use super::flow::flows;
 use super::mesh::{Meshed, meshes, save};
-use super::report::{CcoFigures, KindMeasures, Line};
+use super::report::{CcoFigures, KindMeasures, Line, Samples};
 use super::{Failure, Format, Job, Unit};
 use bevy_vessels::synthesis::{
     cco::{Cco, VesselFlow},
@@ -40,12 +40,13 @@ pub struct Grower<'a> {
     stop: &'a AtomicBool,
     roots: Roots,
     growth: Option<Box<dyn Growth>>,
+    samples: Samples,
 }
 
 impl<'a> Grower<'a> {
     /// Nothing grown yet. Once `stop` is set, nothing more is.
     pub fn new(job: &'a Job, stop: &'a AtomicBool) -> Self {
-        Self { job, stop, roots: job.preset.roots(), growth: None }
+        Self { job, stop, roots: job.preset.roots(), growth: None, samples: Samples::default() }
     }
 
     /// Grows the organ of a seed, calling `after_step` after each step, and writes its files. An organ that is there and
@@ -92,7 +93,7 @@ impl<'a> Grower<'a> {
             steps: growth.progress().done,
             grow_ms: (grow_ms * 1e3).round() / 1e3,
             hash: format!("{hash:016x}"),
-            kinds: KindMeasures::of(growth, &*self.job.tissue, seed, &measured, &flows),
+            kinds: KindMeasures::of(growth, &*self.job.tissue, &mut self.samples, &measured, &flows),
             cco: CcoFigures::of(growth),
             files: Vec::new(),
         };

@@ -20,6 +20,26 @@ use std::collections::BTreeMap;
 /// Points drawn from the tissue to measure coverage: its standard error is below 0.4 %.
 const COVERAGE_SAMPLES: usize = 20_000;
 
+/// Points of a tissue by which coverage is measured: the same for all organs, and drawn once.
+#[derive(Default)]
+pub struct Samples {
+    /// The address of their tissue, which may be a stage of the whole.
+    of: usize,
+    points: Vec<Vec3>,
+}
+
+impl Samples {
+    fn over(&mut self, tissue: &dyn Tissue) -> &[Vec3] {
+        let address = std::ptr::from_ref(tissue).cast::<()>().addr();
+        if self.of != address {
+            let mut rng = Stream::Statistics.rng(0);
+            self.of = address;
+            self.points = (0..COVERAGE_SAMPLES).filter_map(|_| tissue.sample(&mut rng)).collect();
+        }
+        &self.points
+    }
+}
+
 /// One organ. Its fields are those of the JSON line, in this order.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Line {
@@ -141,17 +161,15 @@ impl KindMeasures {
     pub fn of(
         growth: &dyn Growth,
         tissue: &dyn Tissue,
-        seed: u64,
+        samples: &mut Samples,
         meshes: &ByKind<Option<&Meshed>>,
         flows: &ByKind<Option<Network>>,
     ) -> Self {
-        let mut rng = Stream::Statistics.rng(seed);
-        let supplied = tissue.at_step(growth.progress().done);
-        let samples: Vec<Vec3> = (0..COVERAGE_SAMPLES).filter_map(|_| supplied.sample(&mut rng)).collect();
+        let samples = samples.over(tissue.at_step(growth.progress().done));
         Self(growth.trees().map(|kind, grown| {
             let mesh = meshes[kind].map(MeshFigures::of);
             let inflow_ml_per_min = flows[kind].as_ref().map(|network| network.inflow().ml_per_min());
-            grown.map(|grown| Measures { mesh, inflow_ml_per_min, ..Measures::of(grown, tissue, &samples) })
+            grown.map(|grown| Measures { mesh, inflow_ml_per_min, ..Measures::of(grown, tissue, samples) })
         }))
     }
 

@@ -1,11 +1,14 @@
 //! Work on many items, on all threads if that pays, with the same result on any number of threads.
 
-/// Fewest items worth handing to another thread, if each takes some tenths of a microsecond.
+/// Fewest items worth handing to another thread that is awake, if each takes some tenths of a microsecond.
 const WORTH_SHARING: usize = 256;
+/// Fewest items worth waking another thread for.
+const WORTH_WAKING: usize = 2048;
 
 #[cfg(feature = "parallel")]
 mod threads {
     use rayon::Yield;
+    use std::cell::Cell;
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     use std::sync::{Mutex, PoisonError};
 
@@ -15,9 +18,31 @@ mod threads {
     /// Waking takes nearly as long.
     const PATIENCE: usize = 4096;
 
+    thread_local! {
+        /// Whether this thread shares no work for now.
+        static ALONE: Cell<bool> = const { Cell::new(false) };
+    }
+
+    /// Number of threads to share work with, this one included.
+    pub fn count() -> usize {
+        if ALONE.get() { 1 } else { rayon::current_num_threads() }
+    }
+
+    /// Does some work without sharing it.
+    pub fn alone<R>(act: impl FnOnce() -> R) -> R {
+        struct Before(bool);
+        impl Drop for Before {
+            fn drop(&mut self) {
+                ALONE.set(self.0);
+            }
+        }
+        let _before = Before(ALONE.replace(true));
+        act()
+    }
+
     /// Number of items that a thread takes at a time; `None` if they are not worth sharing.
     pub fn share_of(items: usize, least: usize) -> Option<usize> {
-        let threads = rayon::current_num_threads();
+        let threads = count();
         (threads > 1 && items >= 2 * least).then(|| items.div_ceil(SHARES * threads).max(least.div_ceil(4)))
     }
 
@@ -83,7 +108,7 @@ mod threads {
 /// Calls `act` for every item and its index. Each item is worth a thread of its own.
 pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + Sync) {
     #[cfg(feature = "parallel")]
-    if items.len() > 1 && rayon::current_num_threads() > 1 {
+    if items.len() > 1 && threads::count() > 1 {
         threads::take_turns(items.len(), items.iter_mut().enumerate(), |(index, item)| act(index, item));
         return;
     }
@@ -94,26 +119,40 @@ pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + S
 /// each time would take as long as a step.
 pub(crate) fn with_company<R: Send>(act: impl FnOnce() -> R + Send) -> R {
     #[cfg(feature = "parallel")]
-    if rayon::current_num_threads() > 1 {
+    if threads::count() > 1 {
         let over = threads::Over::default();
         return rayon::join(|| over.after(act), || over.stand_by()).0;
     }
     act()
 }
 
-/// Does two things, in parallel if there are threads. The thread that finishes first stays awake for the other's work.
-pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+/// Starts work on another thread, if there is one, and tells whether there is. Nobody waits for it. A panic ends it.
+#[cfg_attr(not(feature = "parallel"), expect(unused_variables, reason = "there is no other thread"))]
+pub(crate) fn beside(act: impl FnOnce() + Send + 'static) -> bool {
     #[cfg(feature = "parallel")]
-    if rayon::current_num_threads() > 1 {
-        let over = threads::Over::default();
-        let first = || {
-            let result = a();
-            over.stand_by();
-            result
-        };
-        return rayon::join(first, || over.after(b));
+    if threads::count() > 1 {
+        use std::panic::{AssertUnwindSafe, catch_unwind};
+        rayon::spawn(|| _ = catch_unwind(AssertUnwindSafe(act)));
+        return true;
     }
-    (a(), b())
+    false
+}
+
+/// Does work that shares nothing, such as while it holds a lock: a thread that waits for others may take up any other work,
+/// and that may wait for the same lock.
+pub(crate) fn alone<R>(act: impl FnOnce() -> R) -> R {
+    #[cfg(feature = "parallel")]
+    let act = || threads::alone(act);
+    act()
+}
+
+/// Does work on a thread that shares with others at once, if there are others.
+pub(crate) fn within_pool<R: Send>(act: impl FnOnce() -> R + Send) -> R {
+    #[cfg(feature = "parallel")]
+    if threads::count() > 1 && rayon::current_thread_index().is_none() {
+        return rayon::join(act, || ()).0;
+    }
+    act()
 }
 
 /// Fills `outputs` with `map` of each input, in order. `blank` only sizes the buffer.
@@ -125,6 +164,17 @@ where
     outputs.clear();
     outputs.resize(inputs.len(), blank);
     map_all(inputs, outputs, WORTH_SHARING, |_, input| map(input));
+}
+
+/// As [`map_into`], for work whose threads sleep between.
+pub(crate) fn map_many_into<I, O>(inputs: &[I], outputs: &mut Vec<O>, blank: O, map: impl Fn(&I) -> O + Sync)
+where
+    I: Sync,
+    O: Clone + Send,
+{
+    outputs.clear();
+    outputs.resize(inputs.len(), blank);
+    map_all(inputs, outputs, WORTH_WAKING, |_, input| map(input));
 }
 
 /// Fills `outputs` with `map` of each index and input. Fewer than twice `least` of them are not worth sharing.
@@ -140,9 +190,9 @@ where
     });
 }
 
-/// Lets `act` fill the outputs of the inputs, some at a time.
+/// Lets `act` fill the outputs of the inputs, some at a time, for work whose threads sleep between.
 pub(crate) fn zip_chunks<I: Sync, O: Send>(inputs: &[I], outputs: &mut [O], act: impl Fn(&[I], &mut [O]) + Sync) {
-    zip_shares(inputs, outputs, WORTH_SHARING, |_, inputs, outputs| act(inputs, outputs));
+    zip_shares(inputs, outputs, WORTH_WAKING, |_, inputs, outputs| act(inputs, outputs));
 }
 
 /// As [`zip_chunks`], but `act` also gets the index of a chunk's first item.
@@ -184,7 +234,8 @@ mod tests {
                 });
                 assert!(outputs.iter().zip(&inputs).all(|(&output, &input)| output == 2 * input));
                 assert!(counts.iter().enumerate().all(|(index, &count)| count == 20 * index as u32));
-                assert_eq!(join(|| 1, || 2), (1, 2));
+                assert_eq!(within_pool(|| 1), 1);
+                assert!(!alone(|| beside(|| ())));
             });
         }
     }
@@ -194,9 +245,9 @@ mod tests {
         let panics = |act: &(dyn Fn() + Sync)| catch_unwind(AssertUnwindSafe(act)).is_err();
         for threads in [1, 2] {
             on(threads, || {
+                assert_eq!(beside(|| panic!("expected by the test")), threads > 1);
                 assert!(panics(&|| with_company(|| panic!("expected by the test"))));
-                assert!(panics(&|| _ = join(|| panic!("expected by the test"), || ())));
-                assert!(panics(&|| _ = join(|| (), || panic!("expected by the test"))));
+                assert!(panics(&|| within_pool(|| panic!("expected by the test"))));
                 let fails = |index: usize, _: &mut u32| assert!(index != 20, "expected by the test");
                 assert!(panics(&|| for_each(&mut [0; 40], fails)));
             });

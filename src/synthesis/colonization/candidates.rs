@@ -9,6 +9,8 @@ use crate::synthesis::random::{Stream, VesselRng};
 use crate::synthesis::space::order::SpatialOrder;
 use crate::synthesis::tissue::Tissue;
 use bevy_math::{Vec3, bounding::Aabb3d};
+use std::collections::VecDeque;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Most candidates in a block.
 const BLOCK: u32 = 1024;
@@ -25,47 +27,152 @@ pub(crate) struct Draws {
     /// The random stream, at its beginning.
     rng: VesselRng,
     /// As many as any step needed; surplus ones are empty.
-    blocks: Vec<Vec<Vec3>>,
-    /// The step of the blocks, 0 for none, and whether its candidates were drawn from vacant pieces.
-    drawn: (u32, bool),
+    blocks: Blocks,
 }
+
+/// Where the candidates of a step are drawn from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sampling<'a> {
+    /// The tissue in force.
+    pub tissue: &'a dyn Tissue,
+    /// Number of the step, from 1, and of the last one.
+    pub step: u32,
+    pub last: u32,
+    /// Number of candidates.
+    pub count: u32,
+}
+
+/// The candidates of a step, block by block.
+type Blocks = Vec<Vec<Vec3>>;
 
 impl Draws {
     /// The draws of an organ's seed.
     pub fn new(seed: u64) -> Self {
-        Self { rng: Stream::Attraction.rng(seed), blocks: Vec::new(), drawn: (0, false) }
+        Self { rng: Stream::Attraction.rng(seed), blocks: Vec::new() }
     }
 
     /// Takes another seed, keeping memory.
     pub fn restart(&mut self, seed: u64) {
         self.rng = Stream::Attraction.rng(seed);
-        self.drawn = (0, false);
     }
 
-    /// Draws `count` candidates of a step, from vacant pieces if those are known, unless they have been drawn before.
-    pub fn draw(&mut self, tissue: &dyn Tissue, vacancy: Option<&Vacancy>, step: u32, count: u32) {
-        if self.drawn == (step, vacancy.is_some()) {
-            return;
+    /// Draws that may be done on another thread, for as many steps ahead.
+    pub fn ahead(&self, steps: u32) -> Ahead {
+        Ahead { rng: self.rng.clone(), steps, ready: Mutex::default() }
+    }
+
+    /// Draws the candidates of a step, from vacant pieces if those are known. Those of plain tissue may have been drawn
+    /// ahead.
+    pub fn draw(&mut self, of: Sampling<'_>, vacancy: Option<&Vacancy>, ahead: Option<&Ahead>) {
+        let is_ready = ahead.is_some_and(|ahead| ahead.take(of.step, vacancy.is_none(), &mut self.blocks));
+        if !is_ready {
+            fill(&self.rng, of, vacancy, &mut self.blocks);
         }
-        self.drawn = (step, vacancy.is_some());
-        let needed = count.div_ceil(BLOCK) as usize;
-        if self.blocks.len() < needed {
-            self.blocks.resize_with(needed, Vec::new);
+    }
+}
+
+/// Draws the candidates of a step.
+fn fill(rng: &VesselRng, of: Sampling<'_>, vacancy: Option<&Vacancy>, blocks: &mut Blocks) {
+    let Sampling { tissue, step, count, .. } = of;
+    let needed = count.div_ceil(BLOCK) as usize;
+    if blocks.len() < needed {
+        blocks.resize_with(needed, Vec::new);
+    }
+    let (blocks, beyond) = blocks.split_at_mut(needed);
+    beyond.iter_mut().for_each(Vec::clear);
+    parallel::for_each(blocks, |index, block| {
+        let mut rng = rng.clone();
+        rng.set_word_pos((u128::from(step) << BLOCKS | index as u128) << STRETCH);
+        block.clear();
+        let count = BLOCK.min(count - index as u32 * BLOCK);
+        match vacancy {
+            Some(vacancy) => vacancy.draw(tissue, &mut rng, count, block),
+            None => tissue.draw(&mut rng, count, block),
         }
-        let (blocks, beyond) = self.blocks.split_at_mut(needed);
-        beyond.iter_mut().for_each(Vec::clear);
-        let rng = &self.rng;
-        parallel::for_each(blocks, |index, block| {
-            let mut rng = rng.clone();
-            rng.set_word_pos((u128::from(step) << BLOCKS | index as u128) << STRETCH);
-            block.clear();
-            let count = BLOCK.min(count - index as u32 * BLOCK);
-            match vacancy {
-                Some(vacancy) => vacancy.draw(tissue, &mut rng, count, block),
-                None => tissue.draw(&mut rng, count, block),
-            }
+        // Nearly always all of them are, and to see that takes less than to keep those that are.
+        if !block.iter().fold(true, |all, candidate| all & candidate.is_finite()) {
             block.retain(|candidate| candidate.is_finite());
-        });
+        }
+    });
+}
+
+/// Candidates of coming steps, drawn on another thread. Whoever needs them doesn't wait for them.
+#[derive(Debug)]
+pub(crate) struct Ahead {
+    rng: VesselRng,
+    steps: u32,
+    ready: Mutex<Ready>,
+}
+
+/// Candidates that are ready. The lock on them is never held while any are drawn.
+#[derive(Debug, Default)]
+struct Ready {
+    /// The next step whose candidates will be asked for; 0 if none will.
+    next: u32,
+    /// Steps from then on, in order.
+    steps: VecDeque<(u32, Blocks)>,
+    spare: Vec<Blocks>,
+}
+
+impl Ahead {
+    /// Most steps that are drawn ahead.
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Whether so many steps are still to be drawn.
+    pub fn lacks(&self, steps: usize) -> bool {
+        let ready = self.ready();
+        ready.next > 0 && ready.steps.len() + steps <= self.steps as usize
+    }
+
+    /// Draws the first step that is not ready, unless enough are. `at` gives the one of a number.
+    pub fn draw_next<'a>(&self, at: impl Fn(u32) -> Sampling<'a>) -> bool {
+        let (of, mut blocks) = {
+            let mut ready = self.ready();
+            let number = ready.steps.back().map_or(ready.next, |(last, _)| last + 1);
+            let of = at(number);
+            if ready.next == 0 || number >= ready.next + self.steps || number > of.last {
+                return false;
+            }
+            (of, ready.spare.pop().unwrap_or_default())
+        };
+        fill(&self.rng, of, None, &mut blocks);
+        let mut ready = self.ready();
+        let is_late = ready.next > of.step || ready.next == 0;
+        let follows = ready.steps.back().is_none_or(|(last, _)| last + 1 == of.step);
+        if is_late || !follows {
+            ready.spare.push(blocks);
+        } else {
+            ready.steps.push_back((of.step, blocks));
+        }
+        true
+    }
+
+    /// Takes the candidates of a step in exchange for old ones, if they are ready; and tells whether `more` of plain tissue
+    /// will be asked for.
+    fn take(&self, step: u32, more: bool, blocks: &mut Blocks) -> bool {
+        let mut ready = self.ready();
+        let Ready { next, steps, spare } = &mut *ready;
+        *next = if more { step + 1 } else { 0 };
+        while let Some((number, mut drawn)) = steps.pop_front() {
+            let is_it = more && number == step;
+            if is_it {
+                std::mem::swap(&mut drawn, blocks);
+            }
+            spare.push(drawn);
+            if is_it {
+                return true;
+            }
+            if number > step && more {
+                break;
+            }
+        }
+        false
+    }
+
+    fn ready(&self) -> MutexGuard<'_, Ready> {
+        self.ready.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

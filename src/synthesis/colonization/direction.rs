@@ -35,8 +35,7 @@ pub(crate) fn decide(
     let along = forest.directions[index];
     if forest.children(node) > 0 {
         return mean.map_or(Decision::Rest, |mean| {
-            let angle = forest.sprout_angle(node);
-            let beside = turn_toward(along, mean, angle);
+            let beside = turn_toward(along, mean, forest.sprout(node));
             Decision::Extend(mix(beside, mean, lengths.direction_weight))
         });
     }
@@ -55,10 +54,11 @@ fn mix(perception: Vec3, mean: Vec3, weight: f32) -> Vec3 {
     (perception * weight + mean * (1.0 - weight)).try_normalize().unwrap_or(mean)
 }
 
-/// Turns a unit vector by `angle` towards `target`, in the plane of both; in any plane if they are parallel.
-fn turn_toward(direction: Vec3, target: Vec3, angle: f32) -> Vec3 {
-    let axis = direction.cross(target).try_normalize().unwrap_or_else(|| direction.any_orthonormal_vector());
-    rotate(direction, axis, angle)
+/// Turns a unit vector towards `target` by an angle of which cosine and sine are given, in the plane of both; in any plane
+/// if they are parallel.
+fn turn_toward(direction: Vec3, target: Vec3, (cos, sin): (f32, f32)) -> Vec3 {
+    let across = target.reject_from_normalized(direction).try_normalize();
+    (direction * cos + across.unwrap_or_else(|| direction.any_orthonormal_vector()) * sin).normalize_or(direction)
 }
 
 fn rotate(vector: Vec3, axis: Vec3, angle: f32) -> Vec3 {
@@ -67,16 +67,16 @@ fn rotate(vector: Vec3, axis: Vec3, angle: f32) -> Vec3 {
 }
 
 /// Spread, in radians, of the angles between a direction and the directions to the drains.
-fn spread(
-    position: Vec3,
-    along: Vec3,
-    drains: impl ExactSizeIterator<Item = Vec3> + Clone,
-    measure: AngleSpread,
-) -> f32 {
-    let angle = |drain: Vec3| ops::acos(along.dot((drain - position).normalize_or(along)).clamp(-1.0, 1.0));
-    let count = drains.len() as f32;
-    let mean = drains.clone().map(angle).sum::<f32>() / count;
-    let squares: f32 = drains.map(angle).map(|angle| angle - mean).map(|off| off * off).sum();
+fn spread(position: Vec3, along: Vec3, drains: impl Iterator<Item = Vec3>, measure: AngleSpread) -> f32 {
+    // Mean and squared deviations in one pass, since every angle takes an arc cosine (Welford 1962).
+    let (mut count, mut mean, mut squares) = (0.0, 0.0, 0.0);
+    for drain in drains {
+        let angle = ops::acos(along.dot((drain - position).normalize_or(along)).clamp(-1.0, 1.0));
+        let before = angle - mean;
+        count += 1.0;
+        mean += before / count;
+        squares += before * (angle - mean);
+    }
     match measure {
         AngleSpread::StandardDeviation => (squares / count).sqrt(),
         AngleSpread::RootSumOfSquares => squares.sqrt(),
@@ -154,8 +154,9 @@ mod tests {
         assert_eq!(mix(Vec3::X, Vec3::NEG_X, 0.5), Vec3::NEG_X);
         assert_eq!(mix(Vec3::X, Vec3::Y, 0.0), Vec3::Y);
         assert_eq!(mix(Vec3::X, Vec3::Y, 1.0), Vec3::X);
-        assert!(turn_toward(Vec3::X, Vec3::NEG_X, 1.0).is_normalized());
-        assert!((turn_toward(Vec3::X, Vec3::Y, 0.3).angle_between(Vec3::X) - 0.3).abs() < 1e-5);
+        assert!(turn_toward(Vec3::X, Vec3::NEG_X, (0.6, 0.8)).is_normalized());
+        let by_a_little = (0.3_f32.cos(), 0.3_f32.sin());
+        assert!((turn_toward(Vec3::X, Vec3::Y, by_a_little).angle_between(Vec3::X) - 0.3).abs() < 1e-5);
     }
 
     #[test]

@@ -85,7 +85,7 @@ pub(crate) struct Heard {
 }
 
 /// New nodes for whose drains one thread searches at a time.
-const NODES_PER_SHARE: usize = 256;
+const NODES_PER_SHARE: usize = 1024;
 
 /// Notifications of drains about new nodes. Reuses its buffers.
 #[derive(Debug, Default)]

@@ -1,6 +1,7 @@
 //! The forest of one system while it grows: the tree, with further data of each node for growth.
 
 use super::drains::Attraction;
+use super::powers::Powers;
 use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::tissue::{Facet, Tissue, TissuePoint};
 use crate::synthesis::tree::murray;
@@ -36,6 +37,7 @@ pub(crate) struct Forest {
     tip: (f32, f32),
     terminal_radius: f32,
     exponent: f32,
+    powers: Powers,
 }
 
 /// A node's sum and its children, as a list that begins with the youngest.
@@ -93,6 +95,8 @@ impl Forest {
         self.terminal_radius = terminal_radius;
         self.exponent = exponent;
         self.tip = (terminal_radius, 1.0);
+        self.powers.set_exponent(exponent);
+        self.powers.meet(1.0);
     }
 
     /// The index over all nodes.
@@ -223,10 +227,12 @@ impl Forest {
         self.fanouts[node as usize].0 & Fanout::ROOT != 0
     }
 
-    /// Angle at which a new tip leaves an inter-node beside its only child, in radians.
-    pub fn sprout_angle(&self, node: u32) -> f32 {
+    /// Cosine and sine of the angle at which a new tip leaves an inter-node beside its only child.
+    pub fn sprout(&self, node: u32) -> (f32, f32) {
         // With one child, the sum at the node is the child's.
-        murray::sprout_angle(self.kin[node as usize].sum / self.tip.1, self.exponent)
+        let sum = self.kin[node as usize].sum / self.tip.1;
+        let cos = murray::sprout_cos(self.powers.root(sum), self.powers.root(1.0 + sum));
+        (cos, (1.0 - cos * cos).max(0.0).sqrt())
     }
 
     /// Computes the sums of all nodes that new tips changed, from the tips to the roots. `changed` is called for each
@@ -240,6 +246,7 @@ impl Forest {
             let own = &mut self.kin[node as usize];
             if sum != own.sum {
                 own.sum = sum;
+                self.powers.meet(sum);
                 self.unsettled.insert(node);
                 changed(node);
                 let parent = self.tree.parents()[node as usize];
@@ -260,12 +267,10 @@ impl Forest {
     /// roots.
     pub fn settle(&mut self) {
         self.changed.clear();
-        let inverse_exponent = self.exponent.recip();
         let radii = self.tree.radii_mut();
         while let Some(node) = self.unsettled.pop_last() {
             let sum = self.kin[node as usize].sum;
-            let radius = if sum == 1.0 { 1.0 } else { ops::powf(sum, inverse_exponent) };
-            radii[node as usize] = self.terminal_radius * radius;
+            radii[node as usize] = self.terminal_radius * self.powers.root(sum);
             self.changed.push(node);
         }
     }

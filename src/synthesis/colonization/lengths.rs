@@ -1,13 +1,14 @@
 //! The settings of one system in the form used by a step: lengths multiplied by λ_t, angles in radians and cosines.
 
 use super::settings::{AngleSpread, SystemSettings};
+use crate::synthesis::space::point_grid::PointGrid;
 use crate::synthesis::tissue::TissueGrowth;
 use crate::synthesis::tree::murray;
 use bevy_math::ops;
 use std::f32::consts::PI;
 
 /// One system's settings at the present size of the tissue.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Lengths {
     pub drain_birth: f32,
     pub node_birth: f32,
@@ -16,10 +17,10 @@ pub(crate) struct Lengths {
     pub step: f32,
     pub terminal_radius: f32,
     pub direction_weight: f32,
-    /// γ/2 in radians.
-    pub half_perception: f32,
     /// cos γ/2, or below −1 if everything is perceived.
     pub cos_half_perception: f32,
+    /// sin γ/2.
+    pub sin_half_perception: f32,
     pub bifurcation_threshold: f32,
     pub angle_spread: AngleSpread,
     /// Half the angle between the daughters of a symmetric bifurcation, in radians.
@@ -43,8 +44,8 @@ impl Lengths {
             step: settings.step_length * scale,
             terminal_radius: settings.terminal_radius * if settings.scale_terminal_radius { scale } else { 1.0 },
             direction_weight: settings.direction_weight,
-            half_perception,
             cos_half_perception: if half_perception >= PI { -2.0 } else { ops::cos(half_perception) },
+            sin_half_perception: ops::sin(half_perception),
             bifurcation_threshold: settings.bifurcation_threshold.to_radians(),
             angle_spread: settings.angle_spread,
             half_bifurcation: murray::symmetric_half_angle(settings.bifurcation_exponent),
@@ -65,18 +66,9 @@ impl Lengths {
         (0.5 * self.terminal_radius).clamp(self.step / 256.0, self.step / 16.0)
     }
 
-    /// Side of the cells of the index over nodes: a little more than the most frequent query distance. Empty cells cost
-    /// nothing, and a cell of this size has about one node.
-    pub fn node_cell(&self) -> f32 {
-        CELL * self.node_birth.max(self.kill).max(0.25 * self.influence)
-    }
-
-    /// Side of the cells of the index over drains.
-    pub fn drain_cell(&self) -> f32 {
-        CELL * self.drain_birth.max(0.25 * self.influence)
+    /// Side of the cells of the indices over nodes and drains, which are asked together: a little more than twice the most
+    /// frequent reach. Empty cells cost nothing, and a cell of this size has about one node.
+    pub fn cell(&self) -> f32 {
+        PointGrid::CELL * self.node_birth.max(self.drain_birth).max(self.kill).max(0.25 * self.influence)
     }
 }
-
-/// Side of a cell relative to the most frequent query distance: a little more than two, so that a ball of that radius
-/// meets at most two cells along each axis.
-const CELL: f32 = 2.01;

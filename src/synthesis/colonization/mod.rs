@@ -10,11 +10,13 @@
 //! A step depends on the settings and the seed alone, not on time, frames or the number of threads.
 
 mod candidates;
+mod company;
 mod direction;
 mod drains;
 mod forest;
 mod lengths;
 mod perception;
+mod powers;
 mod report;
 pub mod seam;
 mod settings;
@@ -30,13 +32,14 @@ pub use settings::{AngleSpread, ColonizationSettings, SettingsError, SettingsWar
 
 use crate::synthesis::parallel;
 use crate::synthesis::roots::{RootError, Roots};
-use crate::synthesis::tissue::{Tissue, TissuePoint};
+use crate::synthesis::tissue::{Derived, Tissue, TissuePoint};
 use crate::synthesis::tree::{BedLink, ByKind, NodeId, VesselKind, VesselTree};
 use bevy_math::Vec3;
 use candidates::{Candidates, Draws};
+use company::{Company, Veins};
 use std::sync::Arc;
 use step::Step;
-use system_growth::{Supplied, SystemGrowth};
+use system_growth::SystemGrowth;
 use vacancy::Vacancy;
 
 /// The reason why growth could not start.
@@ -83,9 +86,9 @@ pub struct Colonization {
     draws: Draws,
     candidates: Candidates,
     vacancy: Vacancy,
-    /// Drains to be handed from the arteries to the veins.
-    handed: Vec<Supplied>,
     links: Vec<BedLink>,
+    /// What was derived from the tissue, if it keeps nothing itself.
+    derived: Derived,
 }
 
 impl Colonization {
@@ -103,7 +106,8 @@ impl Colonization {
         seed: u64,
     ) -> Result<Self, ColonizationError> {
         settings.validate()?;
-        let placed = Self::placed(tissue.as_ref(), &settings, roots, seed)?;
+        let derived = Derived::default();
+        let placed = Self::placed((tissue.as_ref(), &derived), &settings, roots, seed)?;
         let bounds = tissue.bounds();
         let systems = settings.systems().map(|(_, settings)| SystemGrowth::new(settings, &bounds));
         let mut growth = Self {
@@ -115,8 +119,8 @@ impl Colonization {
             draws: Draws::new(seed),
             candidates: Candidates::default(),
             vacancy: Vacancy::default(),
-            handed: Vec::new(),
             links: Vec::new(),
+            derived,
         };
         growth.reset_vacancy();
         growth.plant(&placed, roots);
@@ -134,7 +138,7 @@ impl Colonization {
         seed: u64,
     ) -> Result<(), ColonizationError> {
         settings.validate()?;
-        let placed = Self::placed(self.tissue.as_ref(), &settings, roots, seed)?;
+        let placed = Self::placed((self.tissue.as_ref(), &self.derived), &settings, roots, seed)?;
         let bounds = self.tissue.bounds();
         for (system, (_, settings)) in self.systems.iter_mut().zip(settings.systems()) {
             system.restart(settings, &bounds);
@@ -149,12 +153,12 @@ impl Colonization {
     }
 
     fn placed(
-        tissue: &dyn Tissue,
+        (tissue, derived): (&dyn Tissue, &Derived),
         settings: &ColonizationSettings,
         roots: &Roots,
         seed: u64,
     ) -> Result<ByKind<Vec<TissuePoint>>, ColonizationError> {
-        let placed = roots.resolve(tissue, &settings.root_spacing(), seed)?;
+        let placed = roots.resolve_with(tissue, &settings.root_spacing(), seed, derived)?;
         for (kind, system) in settings.systems() {
             check_radii(kind, system, roots.given[kind].as_ref())?;
         }
@@ -191,7 +195,7 @@ impl Colonization {
         self.step += 1;
         let step = Step { tissue: self.tissue.as_ref(), settings: &self.settings, number: self.step };
         let [arteries, veins] = &mut self.systems;
-        step.choose_candidates(&mut self.draws, &mut self.candidates, &mut self.vacancy, arteries);
+        step.choose_candidates((&mut self.draws, None), &mut self.candidates, &mut self.vacancy, arteries);
         let (born, arterial) = step.grow_arteries(arteries, &self.candidates, &mut self.vacancy);
         let venous = step.grow_veins(veins, arteries.supplied(), &mut self.links);
         let acted = born > 0 || arterial.new_nodes > 0 || venous.new_nodes > 0;
@@ -206,55 +210,30 @@ impl Colonization {
 
     /// Does all remaining steps.
     ///
-    /// Arteries don't depend on veins. So while the veins grow towards the drains that the arteries supplied in one
-    /// step, the arteries do the next step, on another thread if there is one.
+    /// Arteries don't depend on veins. So another thread, if there is one, grows the veins behind them, and draws candidates
+    /// ahead of them. Where it doesn't come to that, since other programs keep it busy, this thread does so.
     pub fn run(&mut self) {
-        let (tissue, settings) = (self.tissue.as_ref(), &self.settings);
-        let at = |number: u32| Step { tissue, settings, number };
-        let (draws, candidates, vacancy) = (&mut self.draws, &mut self.candidates, &mut self.vacancy);
-        let ([arteries, veins], handed, links) = (&mut self.systems, &mut self.handed, &mut self.links);
-        let (done, idle) = (&mut self.step, &mut self.idle);
-        parallel::with_company(|| {
-            // The step that the veins have not done yet, and whether the arteries did something in it.
-            let (mut waiting, mut acted) = (None, true);
-            let mut grow_veins = |handed: &[Supplied], waiting: Option<u32>| {
-                waiting.is_some_and(|number| at(number).grow_veins(veins, handed, links).new_nodes > 0)
-            };
-            while !is_over(*done, *idle, settings) {
-                if !acted {
-                    // Whether there is a next step depends on the veins.
-                    let grown = grow_veins(handed, waiting.take());
-                    *idle = at(*done).idle_after(*idle, grown);
-                    acted = true;
-                    continue;
-                }
-                let step = at(*done + 1);
-                // All threads test candidates, since the rest of the arteries' step has little work to share.
-                step.choose_candidates(draws, candidates, vacancy, arteries);
-                // The next ones are drawn ahead, unless they depend on this step's result.
-                let ahead = vacancy.chosen().is_none() && step.number < settings.steps;
-                let beside = || {
-                    grow_veins(handed, waiting);
-                    if ahead {
-                        at(step.number + 1).draw(draws, None);
-                    }
-                };
-                let grow = || step.grow_arteries(arteries, candidates, vacancy);
-                let ((born, report), ()) = parallel::join(grow, beside);
-                acted = born > 0 || report.new_nodes > 0;
-                if acted {
-                    *idle = 0;
-                }
-                handed.clear();
-                handed.extend_from_slice(arteries.supplied());
-                (*done, waiting) = (step.number, Some(step.number));
-            }
-            let grown = grow_veins(handed, waiting);
-            if !acted {
-                *idle = at(*done).idle_after(*idle, grown);
-            }
-        });
+        parallel::within_pool(|| self.run_in_company());
         self.settle();
+    }
+
+    fn run_in_company(&mut self) {
+        let Self { settings, draws, candidates, vacancy, systems: [arteries, own], .. } = self;
+        let veins = Veins::new(std::mem::take(own), std::mem::take(&mut self.links));
+        let company = Company::new(Arc::clone(&self.tissue), settings.clone(), draws, veins);
+        while !is_over(self.step, self.idle, settings) {
+            let step = Step { tissue: &*self.tissue, settings, number: self.step + 1 };
+            step.choose_candidates((draws, Some(company.ahead())), candidates, vacancy, arteries);
+            let (born, report) = step.grow_arteries(arteries, candidates, vacancy);
+            company.hand(step.number, arteries.supplied());
+            company.call();
+            self.step = step.number;
+            // If nothing has happened, whether growth goes on depends on the veins.
+            let acted = born > 0 || report.new_nodes > 0 || company.catch_up(|veins| veins.grew);
+            self.idle = step.idle_after(self.idle, acted);
+        }
+        let veins = company.end();
+        (*own, self.links) = (veins.growth, veins.links);
     }
 
     /// Whether all steps are done, or [`idle_steps`](ColonizationSettings::idle_steps) in a row without growth.

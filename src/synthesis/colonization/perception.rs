@@ -4,7 +4,6 @@ use super::drains::{Attraction, Drains, Found};
 use super::forest::{Forest, ON_THE_NODE};
 use super::lengths::Lengths;
 use crate::synthesis::parallel;
-use bevy_math::ops;
 
 /// A drain that acts on a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,13 +37,12 @@ pub(crate) fn associate(
     search.refresh(forest, lengths, drains);
     pulls.clear();
     let reach = lengths.influence * lengths.influence;
-    let mut sprout = SproutAngle::default();
     drains.keep_awake(|drain, hearing| {
         let Some(node) = hearing.node() else { return false };
         if hearing.distance > reach {
             return false;
         }
-        let acts = perceives(forest, lengths, node, hearing.cos, &mut sprout);
+        let acts = perceives(forest, lengths, node, hearing.cos);
         if acts {
             pulls.push(Pull { node, drain });
         }
@@ -67,7 +65,7 @@ impl Search {
         self.asking.extend(drains.awake().iter().filter(|&&drain| drains.is_searching(drain)));
         let shared = &*drains;
         let find = |&drain: &u32| nearest_open(forest, lengths, shared.attraction(drain));
-        parallel::map_into(&self.asking, &mut self.found, Found::default(), find);
+        parallel::map_many_into(&self.asking, &mut self.found, Found::default(), find);
         for (&drain, &found) in self.asking.iter().zip(&self.found) {
             drains.settle(drain, found);
         }
@@ -86,39 +84,21 @@ fn nearest_open(forest: &Forest, lengths: &Lengths, drain: Attraction) -> Found 
     found.unwrap_or(Found { closest, ..Found::default() })
 }
 
-/// The angle of the sprout beside a node's child, kept for the next drain of the same node.
-#[derive(Clone, Copy, Debug)]
-struct SproutAngle {
-    node: u32,
-    angle: f32,
-}
-
-impl Default for SproutAngle {
-    fn default() -> Self {
-        Self { node: u32::MAX, angle: 0.0 }
-    }
-}
-
-impl SproutAngle {
-    fn at(&mut self, forest: &Forest, node: u32) -> f32 {
-        if self.node != node {
-            *self = Self { node, angle: forest.sprout_angle(node) };
-        }
-        self.angle
-    }
-}
-
 /// Whether a drain lies in a node's perception volume; its distance has been tested before (Eq. 2 and 3). `cos` is the
 /// cosine of the angle between the node's direction and the direction to the drain.
-fn perceives(forest: &Forest, lengths: &Lengths, node: u32, cos: f32, sprout: &mut SproutAngle) -> bool {
+fn perceives(forest: &Forest, lengths: &Lengths, node: u32, cos: f32) -> bool {
     if forest.is_root(node) || cos == ON_THE_NODE {
         return true;
     }
     if forest.children(node) == 0 {
         return cos >= lengths.cos_half_perception;
     }
-    let angle = ops::acos(cos);
-    (angle - sprout.at(forest, node)).abs() <= lengths.half_perception
+    // |θ − α| ≤ γ/2 for the angle θ to the drain and the angle α of a sprout, in cosines, which fall as angles grow. Where
+    // α − γ/2 is below 0, or α + γ/2 above π, that limit is none.
+    let (half_cos, half_sin) = (lengths.cos_half_perception, lengths.sin_half_perception);
+    let (sprout_cos, sprout_sin) = forest.sprout(node);
+    let (along, across) = (sprout_cos * half_cos, sprout_sin * half_sin);
+    (sprout_cos >= half_cos || cos <= along + across) && (sprout_cos <= -half_cos || cos >= along - across)
 }
 
 /// Compares the acting drains with the result of testing all drains.
@@ -129,7 +109,7 @@ pub(super) fn assert_none_sleeps_in(forest: &Forest, lengths: &Lengths, drains: 
         let hearing = drains.hearing(drain);
         let node = hearing.node().filter(|_| hearing.distance <= reach)?;
         let cos = forest.cos_to(node, drains.attraction(drain))?;
-        perceives(forest, lengths, node, cos, &mut SproutAngle::default()).then_some(Pull { node, drain })
+        perceives(forest, lengths, node, cos).then_some(Pull { node, drain })
     });
     let mut expected: Vec<Pull> = asked.collect();
     expected.sort_unstable();

@@ -1,6 +1,6 @@
 //! The parts of a step, in their order: candidates, arteries, veins.
 
-use super::candidates::{Candidates, Draws};
+use super::candidates::{Ahead, Candidates, Draws, Sampling};
 use super::report::SystemReport;
 use super::settings::ColonizationSettings;
 use super::system_growth::{Ground, Supplied, SystemGrowth};
@@ -18,11 +18,11 @@ pub(super) struct Step<'a> {
 }
 
 impl<'a> Step<'a> {
-    /// Draws candidates, and finds those in tissue that the arteries supply. They are drawn from vacant tissue if that
-    /// is known.
+    /// Draws candidates, unless that has been done ahead, and finds those in tissue that the arteries supply. They are
+    /// drawn from vacant tissue if that is known.
     pub fn choose_candidates(
         self,
-        draws: &mut Draws,
+        (draws, ahead): (&mut Draws, Option<&Ahead>),
         candidates: &mut Candidates,
         vacancy: &mut Vacancy,
         arteries: &SystemGrowth,
@@ -33,14 +33,15 @@ impl<'a> Step<'a> {
             let nodes = (forest.tree.positions(), |node, side| forest.supplies(node, side));
             vacancy.prepare(self.tissue, arteries.length_scale(), nodes, drains);
         }
-        self.draw(draws, vacancy.chosen());
+        draws.draw(self.sampling(), vacancy.chosen(), ahead);
         let ground = self.ground();
         candidates.take(draws, &self.tissue.bounds(), |some, refused| arteries.refuse(some, ground, refused));
     }
 
-    /// Draws candidates, unless it has been done before.
-    pub fn draw(self, draws: &mut Draws, vacancy: Option<&Vacancy>) {
-        draws.draw(self.tissue.at_step(self.number), vacancy, self.number, self.settings.samples);
+    /// Where its candidates are drawn from.
+    pub fn sampling(self) -> Sampling<'a> {
+        let Self { tissue, settings, number } = self;
+        Sampling { tissue: tissue.at_step(number), step: number, last: settings.steps, count: settings.samples }
     }
 
     /// Makes candidates in unsupplied tissue drains, and grows the arteries towards them. Returns the number of drains

@@ -8,7 +8,7 @@ use super::perception::{self, Pull, Search};
 use super::report::SystemReport;
 use super::settings::SystemSettings;
 use crate::synthesis::parallel;
-use crate::synthesis::space::point_grid::PointGrid;
+use crate::synthesis::space::point_grid::{Blockers, PointGrid};
 use crate::synthesis::tissue::{NoGoField, Tissue, TissuePoint};
 use crate::synthesis::tree::BedLink;
 use crate::synthesis::tree::{NO_PARENT, NodeId, VesselTree};
@@ -97,7 +97,7 @@ struct Growing {
 }
 
 /// The forest and the drains of one system, with the lengths in force.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct SystemGrowth {
     pub forest: Forest,
     pub drains: Drains,
@@ -127,22 +127,7 @@ const FITTING_CELLS: Range<f32> = 0.6..1.5;
 impl SystemGrowth {
     /// A system without nodes or drains.
     pub fn new(settings: &SystemSettings, bounds: &Aabb3d) -> Self {
-        let lengths = Lengths::at_size(settings, 1.0);
-        let mut system = Self {
-            forest: Forest::default(),
-            drains: Drains::default(),
-            lengths,
-            size: 1.0,
-            settings: settings.clone(),
-            search: Search::default(),
-            pulls: Vec::new(),
-            pulled: Vec::new(),
-            growing: Vec::new(),
-            way: Vec::new(),
-            news: News::default(),
-            supplied: Vec::new(),
-            givers: Vec::new(),
-        };
+        let mut system = Self::default();
         system.restart(settings, bounds);
         system
     }
@@ -152,8 +137,8 @@ impl SystemGrowth {
         self.settings.clone_from(settings);
         self.size = 1.0;
         self.lengths = Lengths::at_size(settings, 1.0);
-        self.forest.reset(bounds, self.lengths.node_cell(), settings.terminal_radius, settings.bifurcation_exponent);
-        self.drains.reset(bounds, self.lengths.drain_cell());
+        self.forest.reset(bounds, self.lengths.cell(), settings.terminal_radius, settings.bifurcation_exponent);
+        self.drains.reset(bounds, self.lengths.cell());
         self.supplied.clear();
         self.givers.clear();
     }
@@ -183,15 +168,20 @@ impl SystemGrowth {
     pub fn refuse(&self, candidates: &[Vec3], ground: Ground<'_>, refused: &mut [bool]) {
         let (nodes, drains) = (self.forest.index(), self.drains.index());
         let Lengths { node_birth, drain_birth, .. } = self.lengths;
-        // Quick tests first.
-        drains.mark_beside(candidates, drain_birth, refused);
-        let has_sides = ground.has_sides();
-        if !has_sides {
-            nodes.mark_beside(candidates, node_birth, refused);
-        }
-        for (&candidate, refused) in candidates.iter().zip(refused).filter(|(_, refused)| !**refused) {
-            *refused = drains.any_within(candidate, drain_birth)
-                || nodes.any_within(candidate, node_birth) && (!has_sides || self.supplies(candidate, ground));
+        if ground.has_sides() {
+            // Not every node near a candidate supplies it.
+            let drains = Blockers::new([(drains, drain_birth)]);
+            drains.mark_beside(candidates, refused);
+            for (&candidate, refused) in candidates.iter().zip(refused).filter(|(_, refused)| !**refused) {
+                *refused = drains.any(candidate)
+                    || nodes.any_within(candidate, node_birth) && self.supplies(candidate, ground);
+            }
+        } else {
+            let blockers = Blockers::new([(drains, drain_birth), (nodes, node_birth)]);
+            blockers.mark_beside(candidates, refused);
+            for (&candidate, refused) in candidates.iter().zip(refused).filter(|(_, refused)| !**refused) {
+                *refused = blockers.any(candidate);
+            }
         }
     }
 
@@ -262,7 +252,7 @@ impl SystemGrowth {
             *end += len;
             Some(*end - len..*end)
         }));
-        parallel::map_into(pulled, growing, Growing::default(), |range| {
+        parallel::map_many_into(pulled, growing, Growing::default(), |range| {
             let pulls = &pulls[range.clone()];
             let node = pulls[0].node;
             let at = forest.point(node);
@@ -291,7 +281,7 @@ impl SystemGrowth {
                 }
                 let is_free = |place: &TissuePoint| {
                     place.position.is_finite()
-                        && !forest.index().any_within(place.position, LEAST_SEPARATION * lengths.step)
+                        && !forest.index().any_close(place.position, LEAST_SEPARATION * lengths.step)
                 };
                 if way.iter().all(is_free) {
                     let mut node = growing.node;
@@ -347,11 +337,10 @@ impl SystemGrowth {
         if self.lengths.reach() > before {
             self.drains.wake_all();
         }
-        if needs_laying(self.forest.index(), self.lengths.node_cell()) {
-            self.forest.resize_cells(self.lengths.node_cell());
-        }
-        if needs_laying(self.drains.index(), self.lengths.drain_cell()) {
-            self.drains.resize_cells(self.lengths.drain_cell());
+        let cell = self.lengths.cell();
+        if needs_laying(self.forest.index(), cell) || needs_laying(self.drains.index(), cell) {
+            self.forest.resize_cells(cell);
+            self.drains.resize_cells(cell);
         }
     }
 

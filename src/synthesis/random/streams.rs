@@ -23,6 +23,8 @@ pub enum Stream {
     Statistics = 4,
     /// Terminals of constrained constructive optimisation.
     Terminals = 5,
+    /// What is derived from a tissue alone, and is the same for all seeds.
+    Tissue = 6,
 }
 
 impl Stream {

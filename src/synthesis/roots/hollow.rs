@@ -5,11 +5,7 @@
 //! from the tissue lies in the mouth of the deepest hollow. The tissue nearest to the middle of the outer midpoints around
 //! it is the floor.
 
-use super::spread::{SPREAD_SAMPLES, draw};
-use crate::synthesis::{
-    random::VesselRng,
-    tissue::{Tissue, TissuePoint},
-};
+use crate::synthesis::{random::Stream, tissue::Tissue};
 use bevy_math::Vec3;
 use rand::RngExt;
 
@@ -23,11 +19,11 @@ const ROUNDS: u32 = 8;
 const LEAST_DEPTH: f32 = 0.02;
 
 /// The floor of the deepest hollow; `None` if there is none. `diameter` is the tissue's equivalent one.
-pub(super) fn hilum(tissue: &dyn Tissue, diameter: f32, rng: &mut VesselRng) -> Option<TissuePoint> {
-    let samples = draw(tissue, SPREAD_SAMPLES, rng);
+pub(super) fn hilum(tissue: &dyn Tissue, samples: &[Vec3], diameter: f32) -> Option<Vec3> {
     if samples.is_empty() {
         return None;
     }
+    let mut rng = Stream::Tissue.rng(1);
     let mut outer: Vec<(Vec3, f32)> = Vec::new();
     for _ in 0..PAIRS {
         let [a, b] = [(); 2].map(|()| samples[rng.random_range(0..samples.len())]);
@@ -49,5 +45,5 @@ pub(super) fn hilum(tissue: &dyn Tissue, diameter: f32, rng: &mut VesselRng) -> 
             middle = sum / weights;
         }
     }
-    Some(tissue.closest_point(middle))
+    Some(tissue.closest_point(middle).position)
 }

@@ -32,8 +32,8 @@ pub enum RootPlacement {
     /// [entrance]: crate::synthesis::tissue::Tissue::entrance
     Within(f32),
     /// One root at the floor of the tissue's deepest hollow, as vessels enter a kidney or a liver at its hilum; in a
-    /// tissue without a hollow, one chosen by the seed, as with [`Spread`](Self::Spread). The place is found with a
-    /// random sample of the tissue, so it differs a little from seed to seed.
+    /// tissue without a hollow, one chosen by the seed, as with [`Spread`](Self::Spread). The place is found with random
+    /// samples of the tissue, which are the same for all seeds.
     Hilum,
     /// One root beside each root of the [companion](VesselKind::companion), a step length away, in a direction chosen by the
     /// seed. Roots of the companion's given tree count too.

@@ -9,7 +9,7 @@ use super::{
 use crate::synthesis::{
     mesh::is_usable,
     random::Stream,
-    tissue::{Tissue, TissuePoint},
+    tissue::{Derived, Tissue, TissuePoint, web::web},
     tree::{ByKind, VesselKind},
 };
 use bevy_math::Vec3;
@@ -28,8 +28,20 @@ impl Roots {
         spacing: &ByKind<Option<RootSpacing>>,
         seed: u64,
     ) -> Result<ByKind<Vec<TissuePoint>>, RootError> {
+        self.resolve_with(tissue, spacing, seed, &Derived::default())
+    }
+
+    /// The same with what was derived from the tissue before, unless the tissue keeps its own.
+    pub(crate) fn resolve_with(
+        &self,
+        tissue: &dyn Tissue,
+        spacing: &ByKind<Option<RootSpacing>>,
+        seed: u64,
+        derived: &Derived,
+    ) -> Result<ByKind<Vec<TissuePoint>>, RootError> {
         let diameter = tissue.extent().equivalent_diameter();
         let tissue = tissue.at_step(1);
+        let derived = tissue.derived().unwrap_or(derived);
         for (kind, spacing) in spacing.iter() {
             self.check_given(tissue, kind, spacing.as_ref())?;
         }
@@ -45,13 +57,19 @@ impl Roots {
             roots[kind] = match placement {
                 RootPlacement::None => Vec::new(),
                 RootPlacement::Spread(count) => spread(tissue, kind, *count, &mut rng)?,
-                RootPlacement::Hilum => match hilum(tissue, diameter, &mut rng) {
-                    Some(floor) => vec![floor],
-                    None => spread(tissue, kind, 1, &mut rng)?,
-                },
+                RootPlacement::Hilum => {
+                    let find = || hilum(tissue, &web(tissue, derived).positions, diameter);
+                    match derived.hilum(diameter, find) {
+                        Some(floor) => vec![tissue.closest_point(floor)],
+                        None => spread(tissue, kind, 1, &mut rng)?,
+                    }
+                }
                 RootPlacement::Within(reach) => {
                     check_reach(kind, *reach)?;
-                    within(tissue, kind, reach * diameter, own.reach, &mut rng)?
+                    match tissue.entrance() {
+                        Some(position) => vec![TissuePoint { position, ..tissue.closest_point(position) }],
+                        None => within((tissue, web(tissue, derived)), kind, reach * diameter, own.reach, &mut rng)?,
+                    }
                 }
                 RootPlacement::Beside => {
                     let others = self.neighbours(tissue, kind.companion(), &roots);

@@ -3,18 +3,17 @@
 use super::{RootError, Roots};
 use crate::synthesis::{
     random::VesselRng,
-    tissue::{Tissue, TissuePoint},
+    tissue::{
+        Tissue, TissuePoint,
+        web::{SAMPLES, draw},
+    },
     tree::VesselKind,
 };
 use bevy_math::Vec3;
 use rand::RngExt;
 
-/// Least number of tissue samples among which roots are chosen.
-pub(super) const SPREAD_SAMPLES: u32 = 1024;
 /// Least number of samples per spread root.
 const SAMPLES_PER_ROOT: u32 = 16;
-/// Draws per sample after which a tissue counts as exhausted.
-const DRAWS_PER_SAMPLE: u32 = 64;
 /// Directions tried for a root beside another.
 const DIRECTIONS: u32 = 16;
 
@@ -29,7 +28,7 @@ pub(super) fn spread(
     if count > Roots::MAX_SPREAD {
         return Err(RootError::TooMany { kind, count, limit: Roots::MAX_SPREAD });
     }
-    let samples = draw(tissue, SPREAD_SAMPLES.max(count * SAMPLES_PER_ROOT), rng);
+    let samples = draw(tissue, SAMPLES.max(count * SAMPLES_PER_ROOT), rng);
     let mut distances = vec![f32::INFINITY; samples.len()];
     let mut chosen: Vec<TissuePoint> = Vec::with_capacity(count as usize);
     // Begins with the first sample; of equal distances, the earliest is chosen.
@@ -49,13 +48,6 @@ pub(super) fn spread(
         }
     }
     Ok(chosen)
-}
-
-/// Samples of the tissue, beginning with its [entrance](Tissue::entrance) if it has one. Fewer than wanted if draws
-/// fail.
-pub(super) fn draw(tissue: &dyn Tissue, wanted: u32, rng: &mut VesselRng) -> Vec<Vec3> {
-    let draws = (0..wanted * DRAWS_PER_SAMPLE).filter_map(|_| tissue.sample(rng));
-    tissue.entrance().into_iter().chain(draws).take(wanted as usize).collect()
 }
 
 /// A point of the tissue one step length from a root, in the best of several directions. No-go regions are avoided if

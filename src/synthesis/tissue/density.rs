@@ -5,7 +5,7 @@ use crate::synthesis::{
     pace::{Pace, at_once},
     random::VesselRng,
     tissue::{
-        Extent, NoGoField, Tissue, TissuePiece, TissuePoint,
+        Derived, Extent, NoGoField, Tissue, TissuePiece, TissuePoint,
         error::{TissueError, finite_point, positive},
     },
 };
@@ -137,6 +137,7 @@ fn interpolate(size: [usize; 3], local: Vec3, values: &[f32]) -> f32 {
 pub struct DensityTissue {
     tissue: Arc<dyn Tissue>,
     field: DensityField,
+    derived: Derived,
 }
 
 impl DensityTissue {
@@ -148,7 +149,7 @@ impl DensityTissue {
         if tissue.stage(1).is_some() {
             return Err(TissueError::DensityOverStages);
         }
-        Ok(Self { tissue, field })
+        Ok(Self { tissue, field, derived: Derived::default() })
     }
 
     /// The field.
@@ -160,6 +161,10 @@ impl DensityTissue {
 impl Tissue for DensityTissue {
     fn bounds(&self) -> Aabb3d {
         self.tissue.bounds()
+    }
+
+    fn derived(&self) -> Option<&Derived> {
+        Some(&self.derived)
     }
 
     fn extent(&self) -> Extent {

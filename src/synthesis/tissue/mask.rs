@@ -6,7 +6,7 @@ use crate::synthesis::{
     pace::{Pace, Stretch, at_once},
     space::bvh::{Bounds, BoxTree},
     tissue::{
-        Extent, Tissue, TissuePoint,
+        Derived, Extent, Tissue, TissuePoint,
         error::{TissueError, finite_point, positive},
         mask_border::MaskBorder,
     },
@@ -38,6 +38,7 @@ pub struct Mask {
     bounds: Bounds,
     /// Made when the first depth is asked for, since only some generators need it.
     border: OnceLock<MaskBorder>,
+    derived: Derived,
 }
 
 impl Mask {
@@ -157,6 +158,7 @@ impl Mask {
             index: BoxTree::default(),
             bounds: Bounds::EMPTY,
             border: OnceLock::new(),
+            derived: Derived::default(),
         };
         if mask.set.is_empty() {
             return Err(TissueError::EmptyMask);
@@ -242,6 +244,10 @@ impl Mask {
 impl Tissue for Mask {
     fn bounds(&self) -> Aabb3d {
         Aabb3d { min: self.bounds.min, max: self.bounds.max }
+    }
+
+    fn derived(&self) -> Option<&Derived> {
+        Some(&self.derived)
     }
 
     fn extent(&self) -> Extent {

@@ -19,6 +19,7 @@
 //! times.
 
 pub mod density;
+mod derived;
 mod error;
 pub mod growth;
 pub mod mask;
@@ -33,8 +34,11 @@ pub mod source;
 pub mod staged;
 pub mod surface;
 pub mod volume;
+pub(crate) mod web;
 
 pub use density::{DensityField, DensityTissue};
+pub use derived::Derived;
+pub(crate) use derived::{Links, Web};
 pub use error::TissueError;
 pub use growth::TissueGrowth;
 pub use mask::Mask;
@@ -196,6 +200,12 @@ pub trait Tissue: Debug + Send + Sync {
     /// The point of a piece from [`cut`](Self::cut) for this `reach`, chosen by three uniform numbers from 0 to below
     /// 1: distributed as the points of [`sample`](Self::sample) in the piece. `None` as there.
     fn point_of(&self, _reach: f32, _piece: [u32; 2], _numbers: [f32; 3]) -> Option<Vec3> {
+        None
+    }
+
+    /// Where the tissue keeps what is derived from it and takes long: what starts of growths need to place roots. `None` for
+    /// a tissue that keeps nothing; then each growth keeps its own.
+    fn derived(&self) -> Option<&Derived> {
         None
     }
 

@@ -1,6 +1,8 @@
 //! A tissue with all slow preparation done, so that paint can be laid over it any number of times.
 
-use super::{DensityField, DensityTissue, GuidePath, NoGoField, NoGoTissue, Staged, Tissue, TissueError, TissuePaint};
+use super::{
+    DensityField, DensityTissue, GuidePath, NoGoField, NoGoTissue, Staged, Tissue, TissueError, TissuePaint, web,
+};
 use crate::synthesis::{
     mesh::{IndexedMesh, TriangleMesh},
     pace::{Pace, at_once},
@@ -115,7 +117,7 @@ impl PreparedTissue {
         // Guides lie on the first stage.
         let base = self.stages.first().map_or(&self.last, |(first, _)| first);
         let mut stages = Vec::with_capacity(paint.guides.len() + self.stages.len());
-        let pace = pace.part(0.5..1.0);
+        let (pace, deriving) = (pace.part(0.5..0.7), pace.part(0.7..1.0));
         for (number, guide) in paint.guides.iter().enumerate() {
             let share = 1.0 / paint.guides.len() as f32;
             let pace = pace.part(number as f32 * share..(number + 1) as f32 * share);
@@ -126,8 +128,14 @@ impl PreparedTissue {
         for (stage, steps) in &self.stages {
             stages.push((laid(stage)?, *steps));
         }
-        pace.rest(1.0).await;
-        in_stages(stages, laid(&self.last)?)
+        let painted = in_stages(stages, laid(&self.last)?)?;
+        derive(&*painted, &deriving).await;
+        Ok(painted)
+    }
+
+    /// Derives what starts of growths need, as [paced](crate::synthesis::pace) work, so that none of them has to.
+    pub(super) async fn derive(&self, pace: &Pace) {
+        derive(&*self.plain, pace).await;
     }
 
     /// Work of laying this paint over the tissue, in items: that of the [paint](TissuePaint::work), and triangles if
@@ -148,6 +156,14 @@ fn thinned(tissue: Arc<dyn Tissue>, density: Option<&DensityField>) -> Result<Ar
         Some(field) => Arc::new(DensityTissue::new(tissue, field.clone())?),
         None => tissue,
     })
+}
+
+async fn derive(tissue: &dyn Tissue, pace: &Pace) {
+    let first = tissue.at_step(1);
+    if let Some(derived) = first.derived().filter(|_| first.entrance().is_none()) {
+        web::prepare(first, derived, pace).await;
+    }
+    pace.rest(1.0).await;
 }
 
 fn guarded(tissue: Arc<dyn Tissue>, no_go: Option<&NoGoField>) -> Result<Arc<dyn Tissue>, TissueError> {

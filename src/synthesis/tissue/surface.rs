@@ -9,7 +9,7 @@ use crate::synthesis::{
     pace::{Pace, at_once},
     random::{VesselRng, alias_table::AliasTable, many},
     tissue::{
-        Extent, Facet, Tissue, TissuePiece, TissuePoint,
+        Derived, Extent, Facet, Tissue, TissuePiece, TissuePoint,
         error::{TissueError, rounding_within},
         pieces,
     },
@@ -41,6 +41,7 @@ pub struct MeshSurface {
     bounds: Aabb3d,
     area: f32,
     tolerance: f32,
+    derived: Derived,
 }
 
 impl MeshSurface {
@@ -113,6 +114,7 @@ impl MeshSurface {
             tolerance: ((bounds.max - bounds.min).max_element() * SURFACE_TOLERANCE).max(rounding),
             bounds,
             indexed,
+            derived: Derived::default(),
         })
     }
 
@@ -184,6 +186,10 @@ impl Tissue for MeshSurface {
         self.bounds
     }
 
+    fn derived(&self) -> Option<&Derived> {
+        Some(&self.derived)
+    }
+
     fn extent(&self) -> Extent {
         Extent::Area(self.area)
     }
@@ -235,7 +241,7 @@ impl Tissue for MeshSurface {
         let slots = self.picks.len() as u32;
         if slots > 0 {
             many::draw(rng, count, candidates, |[slot, keep, v, w]| {
-                Some(self.pick(many::below(slot, slots), many::unit(keep), [many::unit(v), many::unit(w)]))
+                (true, self.pick(many::below(slot, slots), many::unit(keep), [many::unit(v), many::unit(w)]))
             });
         }
     }

@@ -20,7 +20,7 @@ use crate::synthesis::{
     random::VesselRng,
     space::bvh::Bounds,
     tissue::{
-        Extent, Tissue, TissuePoint,
+        Derived, Extent, Tissue, TissuePoint,
         error::{TissueError, rounding_within},
     },
 };
@@ -53,6 +53,7 @@ pub struct MeshVolume {
     cells: Vec<Cell>,
     /// Triangles in the touched voxels, voxel by voxel.
     triangles: Vec<u32>,
+    derived: Derived,
 }
 
 /// A voxel that the surface touches.
@@ -128,6 +129,7 @@ impl MeshVolume {
             touched,
             cells,
             triangles,
+            derived: Derived::default(),
         };
         volume.volume = volume.measure(&pace.part(0.89..1.0)).await;
         let voxels = (volume.whole.len() + volume.touched_voxels()) as f64 * volume.grid.cell().powi(3);
@@ -253,6 +255,10 @@ impl MeshVolume {
 impl Tissue for MeshVolume {
     fn bounds(&self) -> Aabb3d {
         self.bounds
+    }
+
+    fn derived(&self) -> Option<&Derived> {
+        Some(&self.derived)
     }
 
     fn extent(&self) -> Extent {

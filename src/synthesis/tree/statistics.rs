@@ -9,8 +9,8 @@
 //! definition by diameter; the set of measures after Rauch & Harders 2021, section 5.
 
 use super::{VesselTree, sweep::Children};
-use bevy_math::{Vec3, ops};
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use crate::synthesis::space::point_grid::PointGrid;
+use bevy_math::{Vec3, Vec3A, bounding::Aabb3d, ops};
 
 /// Distribution of a measure over a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -311,17 +311,26 @@ pub fn coverage(tree: &VesselTree, samples: &[Vec3], distance: f32) -> Option<f3
     if tree.is_empty() {
         return Some(0.0);
     }
-    let nodes: Vec<[f32; 3]> = tree.positions().iter().map(Vec3::to_array).collect();
-    // Fails only for more nodes than a u32 can count, which no tree has.
-    let index = ImmutableKdTree::<f32, 3>::new_from_slice(&nodes).ok()?;
-    let is_covered = |sample: &&Vec3| {
-        sample.is_finite() && {
-            let query = sample.to_array();
-            let nearest = index.query(&query).nearest_one::<SquaredEuclidean<f32>>().execute();
-            nearest.distance <= distance * distance
-        }
-    };
-    Some(samples.iter().filter(is_covered).count() as f32 / samples.len() as f32)
+    let index = nodes_within(tree, distance);
+    let mut covered = vec![false; samples.len()];
+    // Most samples of a well-supplied tissue have a node in their own cell.
+    index.mark_beside(samples, distance, &mut covered);
+    let is_near = |sample: Vec3, marked: bool| marked || index.any_within(sample, distance);
+    let is_covered = |&(&sample, &marked): &(&Vec3, &bool)| sample.is_finite() && is_near(sample, marked);
+    Some(samples.iter().zip(&covered).filter(is_covered).count() as f32 / samples.len() as f32)
+}
+
+/// A grid of the nodes, for questions within a distance.
+fn nodes_within(tree: &VesselTree, distance: f32) -> PointGrid {
+    let finite = || tree.positions().iter().copied().filter(|position| position.is_finite()).map(Vec3A::from);
+    let min = finite().reduce(Vec3A::min).unwrap_or_default();
+    let max = finite().reduce(Vec3A::max).unwrap_or_default();
+    // Many more cells than nodes would only take memory.
+    let coarse = (max - min).max_element() / (2.0 * ops::cbrt(tree.len() as f32));
+    let cell = (PointGrid::CELL * distance.abs()).max(0.1 * coarse);
+    let mut index = PointGrid::new(&Aabb3d { min, max }, cell);
+    tree.positions().iter().for_each(|&position| _ = index.push(position));
+    index
 }
 
 /// Number of nodes for which `contains` is false: with a tissue's test, those outside it.

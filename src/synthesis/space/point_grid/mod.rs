@@ -6,11 +6,15 @@
 //! points, whose distances are computed at once. Adding a point allocates nothing once the arrays have room.
 //!
 //! Why not kiddo here: its mutable tree refuses more than 32 points that share a coordinate, as all of a disc at z = 0
-//! do, and points cannot be removed from its immutable one. It is used where a point set is static (coverage of a
-//! finished tree).
+//! do, and points cannot be removed from its immutable one. It is used where the nearest of static points are wanted,
+//! however far they are (the web of samples between roots). Where only a distance is asked for, as for the coverage of a
+//! finished tree, the grid answers several times faster.
 
 mod brick;
 mod questions;
+mod together;
+
+pub use together::Blockers;
 
 use crate::synthesis::space::order::SpatialOrder;
 use crate::synthesis::space::point_grid::brick::{Block, Brick, EMPTY, LANES, NONE, REMOVED, SIDE};
@@ -18,6 +22,10 @@ use bevy_math::{UVec3, Vec3, Vec3A, bounding::Aabb3d};
 
 /// Most bricks in the table: 16 MiB. Larger spaces get coarser cells, which cost only speed.
 const MAX_BRICKS: f64 = (1u32 << 22) as f64;
+/// Most bricks of which all exist from the start: 264 KiB. Queries find them without the table.
+const MOST_AT_HAND: usize = 1024;
+/// Points for a brick from which more bricks than that exist from the start.
+const WELL_FILLED: usize = 4;
 /// Fewest points whose order in memory matters: fewer fit in the processor's cache in any order.
 const WORTH_ORDERING: usize = 20_000;
 
@@ -38,6 +46,8 @@ pub struct PointGrid {
     /// Number of bricks along x, and in an xy layer.
     row: u32,
     layer: u32,
+    /// Whether all bricks exist, in the order of their places. Otherwise the table has the brick of each place.
+    is_full: bool,
     table: Vec<u32>,
     bricks: Vec<Brick>,
     blocks: Vec<Block>,
@@ -53,10 +63,13 @@ pub struct PointGrid {
 }
 
 impl PointGrid {
+    /// Side of a cell relative to the most frequent query distance: a little more than two, so that a ball of that
+    /// radius meets at most two cells along each axis.
+    pub const CELL: f32 = 2.01;
+
     /// An empty grid over a box. Cells have at least the side `cell`, and more if the box would need too many.
     ///
-    /// A good choice is a little more than twice the query distance: a ball then meets at most two cells along each
-    /// axis.
+    /// A good choice is [`CELL`](Self::CELL) times the query distance.
     pub fn new(bounds: &Aabb3d, cell: f32) -> Self {
         let mut grid = Self::default();
         grid.reset(bounds, cell);
@@ -113,15 +126,26 @@ impl PointGrid {
         let sides = (self.cells + (SIDE - 1)) / SIDE;
         self.row = sides.x;
         self.layer = sides.x * sides.y;
+        let places = (self.layer * sides.z) as usize;
+        self.is_full = places <= MOST_AT_HAND.max(self.points.len() / WELL_FILLED);
         self.table.clear();
-        self.table.resize((self.layer * sides.z) as usize, EMPTY);
         self.bricks.clear();
-        self.bricks.push(Brick::EMPTY);
+        if self.is_full {
+            self.bricks.resize(places, Brick::EMPTY);
+        } else {
+            self.table.resize(places, EMPTY);
+            self.bricks.push(Brick::EMPTY);
+        }
         self.blocks.clear();
         self.blocks.push(Block::EMPTY);
         self.next.clear();
         self.next.push(EMPTY);
         self.free = EMPTY;
+    }
+
+    /// Whether the cells of both are the same.
+    pub fn has_cells_of(&self, other: &Self) -> bool {
+        self.origin == other.origin && self.cell == other.cell && self.cells == other.cells
     }
 
     /// Side of a cell.
@@ -163,7 +187,8 @@ impl PointGrid {
     pub fn remove(&mut self, id: u32) {
         let point = std::mem::replace(&mut self.points[id as usize], REMOVED);
         let (place, cell) = self.locate(self.cell_of(point));
-        let brick = &mut self.bricks[self.table[place] as usize];
+        let index = self.brick_at(place);
+        let brick = &mut self.bricks[index];
         let head = brick.heads[cell];
         // The last point of the cell's first block takes the place of the one that leaves.
         let last = self.blocks[head as usize].len() - 1;
@@ -190,12 +215,12 @@ impl PointGrid {
     fn link(&mut self, id: u32) {
         let point = self.points[id as usize];
         let (place, cell) = self.locate(self.cell_of(point));
-        let brick = &mut self.table[place];
-        if *brick == EMPTY {
-            *brick = self.bricks.len() as u32;
+        if !self.is_full && self.table[place] == EMPTY {
+            self.table[place] = self.bricks.len() as u32;
             self.bricks.push(Brick::EMPTY);
         }
-        let brick = &mut self.bricks[*brick as usize];
+        let index = self.brick_at(place);
+        let brick = &mut self.bricks[index];
         brick.filled |= 1 << cell;
         let head = &mut brick.heads[cell];
         let used = if *head == EMPTY { LANES } else { self.blocks[*head as usize].len() };
@@ -242,6 +267,12 @@ impl PointGrid {
     fn cells_around(&self, local: Vec3A, radius: f32) -> (UVec3, UVec3) {
         let reach = radius * self.inverse_cell + self.margin;
         (self.cell_at(local - reach), self.cell_at(local + reach))
+    }
+
+    /// Index of the brick at a place; that of the empty one if there is none.
+    #[inline]
+    fn brick_at(&self, place: usize) -> usize {
+        if self.is_full { place } else { self.table[place] as usize }
     }
 
     /// Indices of a cell's brick in the table, and of the cell in the brick.

@@ -1,23 +1,20 @@
 //! Queries of a point grid: whether any point is near, the nearest one, and all points around a position.
 
-use crate::synthesis::space::point_grid::PointGrid;
-use crate::synthesis::space::point_grid::brick::{CELLS, COLUMNS, EMPTY, LAYERS, ROWS, SIDE, range};
-use bevy_math::{BVec4A, UVec3, Vec3, Vec4};
-
-/// Queries processed at once.
-const BATCH: usize = 32;
+use crate::synthesis::space::point_grid::brick::{COLUMNS, EMPTY, LAYERS, ROWS, SIDE, range};
+use crate::synthesis::space::point_grid::{Blockers, PointGrid};
+use bevy_math::{UVec3, Vec3, Vec4};
 
 impl PointGrid {
     /// First block of a cell.
     #[inline]
     fn head(&self, cell: UVec3) -> u32 {
         let (place, inner) = self.locate(cell);
-        self.bricks[self.table[place] as usize].heads[inner]
+        self.bricks[self.brick_at(place)].heads[inner]
     }
 
     /// Calls `visit(first block)` for the filled cells of a box of cells, until it answers false.
     #[inline]
-    fn for_cells(&self, low: UVec3, high: UVec3, mut visit: impl FnMut(u32) -> bool) {
+    pub(super) fn for_cells(&self, low: UVec3, high: UVec3, mut visit: impl FnMut(u32) -> bool) {
         let (first, last) = (low / SIDE, high / SIDE);
         for z in first.z..=last.z {
             let layers = LAYERS[range(low.z, high.z, z)];
@@ -25,8 +22,7 @@ impl PointGrid {
                 let rows = layers & ROWS[range(low.y, high.y, y)];
                 let place = (y * self.row + z * self.layer) as usize;
                 for x in first.x..=last.x {
-                    let brick = self.table[place + x as usize];
-                    let brick = &self.bricks[brick as usize];
+                    let brick = &self.bricks[self.brick_at(place + x as usize)];
                     let mut cells = brick.filled & rows & COLUMNS[range(low.x, high.x, x)];
                     while cells != 0 {
                         if !visit(brick.heads[cells.trailing_zeros() as usize]) {
@@ -79,79 +75,31 @@ impl PointGrid {
 
     /// Whether a point lies within `radius` of `center`, the radius included.
     pub fn any_within(&self, center: Vec3, radius: f32) -> bool {
-        let limit = radius * radius;
+        Blockers::new([(self, radius)]).any(center)
+    }
+
+    /// Whether a point lies within `radius` of `center`, if the ball is much smaller than a cell: it is then seldom in
+    /// more than one.
+    pub fn any_close(&self, center: Vec3, radius: f32) -> bool {
         let (low, high) = self.cells_around(self.local(center), radius);
-        if (high - low).max_element() <= 1 {
-            return self.any_in_eight(low, high, center, limit);
+        if low != high {
+            return self.any_within(center, radius);
         }
-        let mut found = false;
-        self.for_cells(low, high, |head| {
-            found = self.chains_reach([head], center, limit);
-            !found
-        });
-        found
-    }
-
-    /// Whether a point lies within a squared radius of a centre, in the cells from `low` to `high`, at most two along
-    /// each axis.
-    ///
-    /// All of them are checked, whatever is found: a search that may end at any time causes so many branch
-    /// mispredictions that it takes longer. Each axis's part of the indices of [`locate`](Self::locate) is computed
-    /// only once, which saves a good part of the work.
-    fn any_in_eight(&self, low: UVec3, high: UVec3, center: Vec3, limit: f32) -> bool {
-        let is_one_layer = low.z == high.z;
-        let [low, high] = [low, high].map(|cell| {
-            let (brick, inner) = (cell / SIDE, cell % SIDE);
-            let place = UVec3::new(brick.x, brick.y * self.row, brick.z * self.layer);
-            [place, UVec3::new(inner.x, inner.y * SIDE, inner.z * SIDE * SIDE)]
-        });
-        let head = |x: &[UVec3; 2], y: &[UVec3; 2], z: &[UVec3; 2]| {
-            let brick = &self.bricks[self.table[(x[0].x + y[0].y + z[0].z) as usize] as usize];
-            brick.heads[(x[1].x + y[1].y + z[1].z) as usize % CELLS]
-        };
-        let [a, b, c, d] =
-            [head(&low, &low, &low), head(&high, &low, &low), head(&low, &high, &low), head(&high, &high, &low)];
-        if is_one_layer {
-            return self.chains_reach([a, b, c, d], center, limit);
-        }
-        let [e, f, g, h] =
-            [head(&low, &low, &high), head(&high, &low, &high), head(&low, &high, &high), head(&high, &high, &high)];
-        self.chains_reach([a, b, c, d, e, f, g, h], center, limit)
-    }
-
-    /// Whether a point of some chains lies within a squared radius of a centre. Checks all first blocks, then all
-    /// second ones.
-    fn chains_reach<const N: usize>(&self, mut blocks: [u32; N], center: Vec3, limit: f32) -> bool {
-        let limit = Vec4::splat(limit);
-        loop {
-            let reached = blocks.map(|block| self.blocks[block as usize].distances(center).cmple(limit));
-            if reached.into_iter().fold(BVec4A::FALSE, |any, reached| any | reached).any() {
+        let limit = Vec4::splat(radius * radius);
+        let mut block = self.head(low);
+        while block != EMPTY {
+            if self.blocks[block as usize].distances(center).cmple(limit).any() {
                 return true;
             }
-            blocks = blocks.map(|block| self.next[block as usize]);
-            if blocks.into_iter().fold(EMPTY, |any, block| any | block) == EMPTY {
-                return false;
-            }
+            block = self.next[block as usize];
         }
+        false
     }
 
-    /// Marks the centres that have a point within `radius` in the first two blocks of their own cell: the fastest
-    /// query, and usually enough in filled space. Other marks stay.
-    ///
-    /// Each step is done for many centres, so that the processor waits for the memory of all of them at once.
+    /// Marks the centres that have a point within `radius` in the first two blocks of their own cell. See
+    /// [`Blockers::mark_beside`].
     pub fn mark_beside(&self, centers: &[Vec3], radius: f32, marks: &mut [bool]) {
-        let limit = Vec4::splat(radius * radius);
-        let mut heads = [EMPTY; BATCH];
-        for (centers, marks) in centers.chunks(BATCH).zip(marks.chunks_mut(BATCH)) {
-            for (head, &center) in heads.iter_mut().zip(centers) {
-                *head = self.head(self.cell_of(center));
-            }
-            for ((&head, &center), mark) in heads.iter().zip(centers).zip(marks) {
-                let first = self.blocks[head as usize].distances(center).cmple(limit);
-                let second = self.blocks[self.next[head as usize] as usize].distances(center).cmple(limit);
-                *mark |= (first | second).any();
-            }
-        }
+        Blockers::new([(self, radius)]).mark_beside(centers, marks);
     }
 
     /// Calls `visit(id, squared distance)` for every point within `radius`, in no particular order.

@@ -3,7 +3,7 @@
 use super::NoGoField;
 use crate::synthesis::{
     random::VesselRng,
-    tissue::{Extent, Tissue, TissueError, TissuePiece, TissuePoint},
+    tissue::{Derived, Extent, Tissue, TissueError, TissuePiece, TissuePoint},
 };
 use bevy_math::{Vec3, bounding::Aabb3d};
 use std::sync::Arc;
@@ -16,6 +16,7 @@ use std::sync::Arc;
 pub struct NoGoTissue {
     tissue: Arc<dyn Tissue>,
     field: NoGoField,
+    derived: Derived,
 }
 
 impl NoGoTissue {
@@ -31,7 +32,7 @@ impl NoGoTissue {
             Some(before) => before.clone().or(field),
             None => field,
         };
-        Ok(Self { tissue, field })
+        Ok(Self { tissue, field, derived: Derived::default() })
     }
 
     fn allowed(&self, point: Option<Vec3>) -> Option<Vec3> {
@@ -42,6 +43,10 @@ impl NoGoTissue {
 impl Tissue for NoGoTissue {
     fn bounds(&self) -> Aabb3d {
         self.tissue.bounds()
+    }
+
+    fn derived(&self) -> Option<&Derived> {
+        Some(&self.derived)
     }
 
     fn extent(&self) -> Extent {

@@ -102,7 +102,7 @@ impl Tissue for Disc {
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
         many::draw(rng, count, candidates, |words| {
             let point = Vec2::from(words.map(many::signed));
-            (point.length_squared() <= 1.0).then(|| self.at(point * self.radius))
+            (point.length_squared() <= 1.0, self.at(point * self.radius))
         });
     }
 

@@ -18,7 +18,7 @@ fn inside(position: Vec3) -> TissuePoint {
 fn draw_in_ball(rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>, place: impl Fn(Vec3) -> Vec3) {
     many::draw(rng, count, candidates, |words| {
         let point = Vec3::from(words.map(many::signed));
-        (point.length_squared() <= 1.0).then(|| place(point))
+        (point.length_squared() <= 1.0, place(point))
     });
 }
 
@@ -128,7 +128,9 @@ impl Tissue for Cuboid {
     }
 
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
-        many::draw(rng, count, candidates, |words| Some(self.center + self.half * Vec3::from(words.map(many::signed))));
+        many::draw(rng, count, candidates, |words| {
+            (true, self.center + self.half * Vec3::from(words.map(many::signed)))
+        });
     }
 }
 

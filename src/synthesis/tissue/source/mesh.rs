@@ -87,15 +87,16 @@ impl MeshTissue {
             Ok(volume)
         };
         let (stages, last) = match self.mode {
-            TissueMode::Surface | TissueMode::Lining => (Vec::new(), surface(pace.clone()).await?),
-            TissueMode::Volume => (Vec::new(), volume(pace.clone()).await?),
+            TissueMode::Surface | TissueMode::Lining => (Vec::new(), surface(pace.part(0.0..0.7)).await?),
+            TissueMode::Volume => (Vec::new(), volume(pace.part(0.0..0.7)).await?),
             TissueMode::Staged { surface_steps } => {
-                let first = surface(pace.part(0.0..0.2)).await?;
-                (vec![(first, surface_steps)], volume(pace.part(0.2..1.0)).await?)
+                let first = surface(pace.part(0.0..0.15)).await?;
+                (vec![(first, surface_steps)], volume(pace.part(0.15..0.7)).await?)
             }
         };
-        pace.rest(1.0).await;
-        PreparedTissue::of_mesh(mesh, indexed, stages, last)
+        let prepared = PreparedTissue::of_mesh(mesh, indexed, stages, last)?;
+        prepared.derive(&pace.part(0.7..1.0)).await;
+        Ok(prepared)
     }
 }
 
