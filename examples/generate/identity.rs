@@ -113,7 +113,8 @@ pub fn padded(seed: u64) -> String {
 fn mode_of(source: &TissueSource) -> Option<Mode> {
     let TissueSource::Mesh(mesh) = source else { return None };
     Some(match mesh.mode {
-        TissueMode::Surface | TissueMode::Lining => Mode::Surface,
+        TissueMode::Surface => Mode::Surface,
+        TissueMode::Lining => Mode::Lining,
         TissueMode::Volume => Mode::Volume,
         TissueMode::Staged { .. } => Mode::Staged,
     })
