@@ -179,23 +179,6 @@ fn far_from_the_origin_is_right_or_refused() -> Outcome {
     Ok(())
 }
 
-#[test]
-fn a_solid_much_thinner_than_a_voxel_is_refused_by_name() -> Outcome {
-    let ball = ball_soup(16, false)?;
-    let flat = |thickness: f32| with(&ball, |_| false, &moved(&ball, |p| p * Vec3::new(1.0, 1.0, thickness)));
-    assert!(matches!(MeshVolume::new(&flat(1e-5)?, 60), Err(TissueError::TooThin { resolution: 60, .. })));
-    // A thin one that voxels find is filled, and points near it are brought into it.
-    let thin = MeshVolume::new(&flat(0.01)?, 60)?;
-    let mut rng = super::rng(3);
-    let samples = (0..1000).filter_map(|_| thin.sample(&mut rng)).count();
-    assert!(samples > 950, "{samples} of 1000 samples");
-    for _ in 0..300 {
-        let closest = thin.closest_point(super::in_cube(&mut rng, 0.9) * Vec3::new(1.0, 1.0, 0.05)).position;
-        assert!(thin.contains(closest), "{closest} is not inside");
-    }
-    Ok(())
-}
-
 /// A mesh that faces into a lumen is a reversed one, unless it is said to be a lining.
 #[test]
 fn a_lining_faces_as_it_is() -> Outcome {

@@ -23,6 +23,8 @@ pub enum Stream {
     Statistics = 4,
     /// Terminals of constrained constructive optimisation.
     Terminals = 5,
+    /// Points of a tissue that it keeps.
+    Tissue = 6,
 }
 
 impl Stream {

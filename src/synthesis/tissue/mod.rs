@@ -92,10 +92,33 @@ pub enum Extent {
     Area(f32),
     /// A solid, of this volume in cubic tissue lengths.
     Volume(f32),
+    /// A solid so thin for its width that usual spacings of vessels leave room for one layer of them.
+    Sheet {
+        /// Its volume in cubic tissue lengths.
+        volume: f32,
+        /// Its mean thickness in tissue lengths: twice the volume over the area of its surface.
+        thickness: f32,
+    },
 }
 
 impl Extent {
-    /// Diameter of the segment, disc or ball of the same size, in tissue lengths.
+    /// Thickness below which a solid is a sheet, in diameters of the ball of the same volume: about the distance between
+    /// drains in the paper's ball.
+    pub const SHEET: f32 = 1.0 / 32.0;
+
+    /// The extent of a solid with this volume and area of its surface.
+    pub fn solid(volume: f32, area: f32) -> Self {
+        let (whole, thickness) = (Self::Volume(volume), 2.0 * volume / area);
+        if thickness < Self::SHEET * whole.equivalent_diameter() { Self::Sheet { volume, thickness } } else { whole }
+    }
+
+    /// Whether it is that of a solid, thick or thin.
+    pub fn is_solid(self) -> bool {
+        matches!(self, Self::Volume(_) | Self::Sheet { .. })
+    }
+
+    /// Diameter of the segment, disc or ball of the same size, in tissue lengths. A sheet takes as many vessels as a ball
+    /// of this diameter, with the same distances between them.
     ///
     /// The settings of a preset are made for a tissue whose equivalent diameter is 1.
     pub fn equivalent_diameter(self) -> f32 {
@@ -104,6 +127,11 @@ impl Extent {
             Self::Length(length) => length,
             Self::Area(area) => 2.0 * (area / PI).sqrt(),
             Self::Volume(volume) => bevy_math::ops::cbrt(6.0 * volume / PI),
+            // Points `s` apart are V/s³ in a ball and V/(t·s²) in a sheet: s² = s_ball³/t, with s = SHEET · d.
+            Self::Sheet { volume, thickness } => {
+                let ball = Self::Volume(volume).equivalent_diameter();
+                ball * (Self::SHEET * ball / thickness).sqrt()
+            }
         }
     }
 }
