@@ -40,7 +40,7 @@ impl PointGrid {
     }
 
     /// Visits the points within a radius that may shrink on the way: `visit(id, squared distance)` returns the squared
-    /// radius from then on. The centre's own cell comes first, the others in no particular order.
+    /// radius from then on, and below 0 to end. The centre's own cell comes first, the others in no particular order.
     #[inline]
     fn scan(&self, center: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> f32) {
         if self.points.is_empty() {
@@ -50,12 +50,15 @@ impl PointGrid {
         let local = self.local(center);
         let own = self.head(self.cell_at(local));
         self.scan_chain(own, center, &mut limit, &mut visit);
+        if limit < 0.0 {
+            return;
+        }
         let (low, high) = self.cells_around(local, radius.min(limit.sqrt()));
         self.for_cells(low, high, |head| {
             if head != own {
                 self.scan_chain(head, center, &mut limit, &mut visit);
             }
-            true
+            limit >= 0.0
         });
     }
 
@@ -152,6 +155,43 @@ impl PointGrid {
                 *mark |= (first | second).any();
             }
         }
+    }
+
+    /// The same with points that `accepts` for a centre, given their id.
+    pub fn mark_beside_of(
+        &self,
+        centers: &[Vec3],
+        radius: f32,
+        marks: &mut [bool],
+        accepts: impl Fn(u32, Vec3) -> bool,
+    ) {
+        let limit = Vec4::splat(radius * radius);
+        let mut heads = [EMPTY; BATCH];
+        for (centers, marks) in centers.chunks(BATCH).zip(marks.chunks_mut(BATCH)) {
+            for (head, &center) in heads.iter_mut().zip(centers) {
+                *head = self.head(self.cell_of(center));
+            }
+            for ((&head, &center), mark) in heads.iter().zip(centers).zip(marks) {
+                for block in [head, self.next[head as usize]].map(|block| &self.blocks[block as usize]) {
+                    let mut near = block.distances(center).cmple(limit).bitmask();
+                    while near != 0 && !*mark {
+                        let lane = near.trailing_zeros() as usize;
+                        *mark = accepts(block.ids[lane], center);
+                        near &= near - 1;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a point lies within `radius` of `center` that `accepts` its id.
+    pub fn any_of_within(&self, center: Vec3, radius: f32, accepts: impl Fn(u32) -> bool) -> bool {
+        let (limit, mut found) = (radius * radius, false);
+        self.scan(center, radius, |id, _| {
+            found = accepts(id);
+            if found { -1.0 } else { limit }
+        });
+        found
     }
 
     /// Calls `visit(id, squared distance)` for every point within `radius`, in no particular order.
