@@ -32,12 +32,12 @@ impl Entries {
         below(solid, &nearest, point).or_else(|| {
             let bounding = self.bounding.get_or_init(|| bounding(solid));
             let beyond = solid.index.closest_of(point, f32::INFINITY, |triangle| bounding[triangle]);
-            beyond.and_then(|found| below(solid, &found, point)).or_else(|| self.from_anchor(solid, point))
+            beyond.and_then(|found| below(solid, &found, point)).or_else(|| self.beside_anchor(solid, point))
         })
     }
 
     /// The last point inside on a straight way from the nearest anchor.
-    fn from_anchor(&self, solid: &Solid, point: Vec3) -> Option<Vec3> {
+    fn beside_anchor(&self, solid: &Solid, point: Vec3) -> Option<Vec3> {
         let distance = |anchor: &Vec3| anchor.as_dvec3().distance_squared(point.as_dvec3());
         let nearest = self.anchors.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         Some(last_inside(solid, *nearest, point))

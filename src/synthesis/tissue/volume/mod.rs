@@ -16,13 +16,9 @@ use crate::synthesis::{
 use bevy_math::{DVec3, Vec3, bounding::Aabb3d};
 use entry::{Entries, last_inside};
 use rand::RngExt;
-use solid::Solid;
+use solid::{EVEN_STEPS, Solid};
 use std::ops::Range;
 use thin::Thin;
-
-/// Steps whose multiples fill the unit cube uniformly: powers of 1/g, where g⁴ = g + 1 (Roberts, "The Unreasonable
-/// Effectiveness of Quasirandom Sequences", 2018).
-const EVEN_STEPS: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
 
 /// The space that a mesh encloses.
 #[derive(Clone, Debug)]
@@ -43,7 +39,7 @@ impl MeshVolume {
     /// Most draws for a sample from voxels.
     const TRIES: u32 = 128;
     /// Share of the voxels that are inside or touched which the inside must fill for points to be drawn from voxels.
-    const LEAST_SHARE: f64 = 1.0 / 16.0;
+    const LEAST_SHARE: f64 = 1.0 / 8.0;
     /// Points inside that are kept.
     const ANCHORS: usize = 256;
     /// Factor by which rounding may make a step longer than it should be.

@@ -19,6 +19,11 @@ use crate::synthesis::{
 };
 use bevy_math::{DVec2, DVec3, Vec3, bounding::Aabb3d};
 
+/// Steps whose multiples fill the unit cube uniformly: powers of 1/g, where g⁴ = g + 1 (Roberts, "The Unreasonable
+/// Effectiveness of Quasirandom Sequences", 2018).
+pub(super) const EVEN_STEPS: DVec3 =
+    DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2);
+
 /// The voxels of a mesh, and its triangles in those that it touches.
 #[derive(Clone, Debug)]
 pub(super) struct Solid {

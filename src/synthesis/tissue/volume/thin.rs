@@ -1,33 +1,32 @@
 //! Points of a solid that is much thinner than its voxels: a plate, a flap, a wire.
 //!
-//! Hardly a point of such a voxel is inside. But every point inside has a nearest one on the surface, straight below it.
-//! So a place on the surface is drawn, then a depth below it, and the point is kept if no other place is nearer. That is
-//! uniform by volume, except that points nearest to a concave edge are missed: a share of the solid that falls with its
-//! thickness. How deep to go below a triangle is measured with the largest balls that touch it from inside (Ma, Bae &
-//! Choi, "3D medial axis point approximation using nearest neighbors and the normal field", 2012).
+//! Hardly a point of such a voxel is inside. But every point inside has a nearest one on the surface, straight above it.
+//! So a place on the surface is drawn, then a depth below it, and the point is kept if no other place is nearer. Where
+//! several triangles are equally near within rounding, as from the middle of a wire, each has its share of the point. That
+//! is uniform by volume, except that points nearest to a concave edge are missed: a share of the solid that falls with
+//! its thickness. How deep to go below a triangle is measured with the largest balls that touch it from inside (Ma, Bae
+//! & Choi, "3D medial axis point approximation using nearest neighbors and the normal field", 2012).
 
-use super::solid::Solid;
+use super::solid::{EVEN_STEPS, Solid};
 use crate::synthesis::{
-    mesh::doubled_normal,
+    mesh::{doubled_normal, triangle_index::closest_on_triangle},
     pace::{Pace, Stretch},
     random::{VesselRng, alias_table::AliasTable},
+    space::bvh::Bounds,
 };
 use bevy_math::{DVec3, Vec3};
 use rand::RngExt;
 
 /// Places at which the surface of a solid is measured; each triangle has at least one of them.
 const PROBES: f64 = 8192.0;
-/// Steps whose multiples fill the unit square uniformly: powers of 1/g, where g³ = g + 1 (Roberts, "The Unreasonable
-/// Effectiveness of Quasirandom Sequences", 2018).
-const EVEN_STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
 /// How much deeper than measured points are drawn.
 const DEEPER: f64 = 1.25;
 /// Most times that a ball is made smaller; it fits after three to six.
 const SHRINKS: usize = 16;
-/// Share of a ball's radius that counts as rounding.
+/// Share of a distance that counts as rounding.
 const SLACK: f64 = 1.0e-3;
-/// Most draws for a sample; about half of them succeed.
-const TRIES: u32 = 128;
+/// Most draws for a sample; from a third to four fifths of them succeed.
+const TRIES: u32 = 256;
 
 /// The sides of triangles below which the solid lies.
 #[derive(Clone, Debug)]
@@ -67,9 +66,10 @@ impl Thin {
             for inward in [-normal, normal] {
                 let (mut sum, mut deepest) = (0.0, 0.0f64);
                 for probe in 1..=probes {
-                    let numbers = EVEN_STEPS.map(|step| (step * probe as f64).fract());
-                    let depth = thin.depth_below(solid, point_of(solid.corners[triangle as usize], numbers), inward);
-                    sum += depth;
+                    let [v, w, part] = (EVEN_STEPS * (probe + done) as f64).fract().to_array();
+                    let place = point_of(solid.corners[triangle as usize], [v, w]);
+                    let depth = thin.depth_below(solid, place, inward);
+                    sum += depth * thin.share(solid, (place + inward * depth * part).as_vec3(), depth * part);
                     deepest = deepest.max(depth);
                     if stretch.ends_after(16) {
                         measuring.rest(done as f32 / faces.len() as f32).await;
@@ -100,7 +100,8 @@ impl Thin {
             let place = point_of(solid.corners[side.triangle as usize], [rng.random(), rng.random()]);
             let depth = side.depth * rng.random::<f64>();
             let point = (place + side.inward * depth).as_vec3();
-            if self.distance(solid, point) >= depth * (1.0 - SLACK) - self.rounding && solid.contains(point) {
+            let share = self.share(solid, point, depth);
+            if share > 0.0 && rng.random::<f64>() < share && solid.contains(point) {
                 return Some(point);
             }
         }
@@ -130,8 +131,22 @@ impl Thin {
         radius
     }
 
-    fn distance(&self, solid: &Solid, point: Vec3) -> f64 {
-        solid.index.closest(point).map_or(0.0, |nearest| f64::from(nearest.distance_squared).sqrt())
+    /// The share that a triangle has in a point so deep below it: 0 if another one is nearer, and a half if one more is as
+    /// near.
+    fn share(&self, solid: &Solid, point: Vec3, depth: f64) -> f64 {
+        let Some(nearest) = solid.index.closest(point) else { return 0.0 };
+        let reach = f64::from(nearest.distance_squared).sqrt() * (1.0 + SLACK) + self.rounding;
+        if depth > reach {
+            return 0.0;
+        }
+        let (mut as_near, around) = (0u32, Vec3::splat(reach as f32));
+        let region = Bounds::around(&[point - around, point + around]);
+        solid.index.overlapping(&region, |corners, _| {
+            let (weights, on) = closest_on_triangle(point, corners);
+            let is_below = weights.min_element() > 0.0 && on.distance(point.as_dvec3()) <= reach;
+            as_near += u32::from(is_below);
+        });
+        if as_near > 0 { 1.0 / f64::from(as_near) } else { 0.0 }
     }
 }
 
