@@ -113,7 +113,8 @@ pub fn padded(seed: u64) -> String {
 fn mode_of(source: &TissueSource) -> Option<Mode> {
     let TissueSource::Mesh(mesh) = source else { return None };
     Some(match mesh.mode {
-        TissueMode::Surface | TissueMode::Lining => Mode::Surface,
+        TissueMode::Surface => Mode::Surface,
+        TissueMode::Lining => Mode::Lining,
         TissueMode::Volume => Mode::Volume,
         TissueMode::Staged { .. } => Mode::Staged,
     })
@@ -124,7 +125,7 @@ fn described(tissue: &dyn Tissue, mesh: Option<&TriangleMesh>) -> String {
     let extent = match tissue.extent() {
         Extent::Length(value) => format!("length {value}"),
         Extent::Area(value) => format!("area {value}"),
-        Extent::Volume(value) => format!("volume {value}"),
+        Extent::Volume(value) | Extent::Sheet { volume: value, .. } => format!("volume {value}"),
     };
     let Some(mesh) = mesh else { return extent };
     let corners = mesh.positions().iter().flat_map(|at| at.to_array()).map(f32::to_le_bytes);

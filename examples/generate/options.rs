@@ -192,6 +192,8 @@ fn parse_shard(text: &str) -> Result<Shard, String> {
 pub enum Mode {
     /// Over the surface.
     Surface,
+    /// Over the surface, on the side that its triangles face, such as the inside of a hollow organ.
+    Lining,
     /// Through the volume.
     Volume,
     /// Over the surface first, then inward through the volume.
@@ -203,6 +205,7 @@ impl Mode {
     pub fn name(self) -> &'static str {
         match self {
             Self::Surface => "surface",
+            Self::Lining => "lining",
             Self::Volume => "volume",
             Self::Staged => "staged",
         }
@@ -212,6 +215,7 @@ impl Mode {
     pub fn tissue_mode(self, preset: TissueMode, steps: u32) -> TissueMode {
         match (self, preset) {
             (Self::Surface, _) => TissueMode::Surface,
+            (Self::Lining, _) => TissueMode::Lining,
             (Self::Volume, _) => TissueMode::Volume,
             (Self::Staged, TissueMode::Staged { .. }) => preset,
             (Self::Staged, _) => TissueMode::Staged { surface_steps: steps / 2 },

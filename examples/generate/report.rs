@@ -94,7 +94,7 @@ impl From<Extent> for Size {
         let (kind, value) = match extent {
             Extent::Length(value) => (SizeKind::Length, value),
             Extent::Area(value) => (SizeKind::Area, value),
-            Extent::Volume(value) => (SizeKind::Volume, value),
+            Extent::Volume(value) | Extent::Sheet { volume: value, .. } => (SizeKind::Volume, value),
         };
         Self { kind, value }
     }

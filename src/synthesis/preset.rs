@@ -44,8 +44,17 @@ pub struct Preset {
 
 /// The blood that flows through an organ, as measured, and the size at which it does.
 ///
-/// A tree's own resistance lets through far more. `fit_bed` of a [network](crate::synthesis::haemodynamics::Network) or
-/// a [circulation](crate::synthesis::haemodynamics::Circulation) gives the bed the resistance for this flow.
+/// A tree ends in vessels that are far wider than capillaries, so its own resistance lets through many times this flow.
+/// What is missing is the resistance of the vessels below its terminals: the bed. `fit_bed` of a
+/// [network](crate::synthesis::haemodynamics::Network) or a
+/// [circulation](crate::synthesis::haemodynamics::Circulation) finds it, as the one with which this flow passes at the
+/// pressures of roots and bed. Nothing else is fitted: pressures in the tree and wall shear follow from its radii, which
+/// the presets' sources explain.
+///
+/// The presets take flows from: Williams & Leggett, "Reference values for resting blood flow to organs of man" (Clinical
+/// Physics and Physiological Measurement 10, 1989); Carlisle et al., "Estimation of total hepatic blood flow by duplex
+/// ultrasound" (Gut 33, 1992); Koutsiaris et al., "Volume flow and wall shear stress quantification in the human
+/// conjunctival capillaries and post-capillary venules in vivo" (Biorheology 44, 2007).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serialize", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serialize", serde(deny_unknown_fields))]
@@ -59,6 +68,29 @@ pub struct OrganBlood {
 }
 
 impl OrganBlood {
+    /// Flow into a tissue of another size: as much for each gram as in the organ. What a volume weighs goes with its
+    /// cube, and a wall of the same thickness with its square.
+    pub fn flow_into(&self, extent: Extent, scale: Scale) -> Flow {
+        let share = scale.to_metres(extent.equivalent_diameter()) / self.diameter;
+        let mass = match extent {
+            Extent::Length(_) => share,
+            Extent::Area(_) => share * share,
+            Extent::Volume(_) | Extent::Sheet { .. } => share * share * share,
+        };
+        Flow::from_cubic_metres_per_second(self.flow.cubic_metres_per_second() * mass)
+    }
+
+    #[cfg(feature = "serialize")]
+    fn validate(&self) -> Result<(), PresetError> {
+        let flow = self.flow.cubic_metres_per_second();
+        for (what, value) in [("flow in m³/s", flow), ("diameter in metres", self.diameter)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(PresetError::Blood { what, value });
+            }
+        }
+        Ok(())
+    }
+
     /// The scale at which a tissue has the size of the organ, in whatever unit its mesh is.
     ///
     /// # Errors
@@ -110,6 +142,7 @@ impl Preset {
         }
         let preset: Self = ron_options().from_str(text).map_err(Box::new)?;
         preset.generator.validate()?;
+        preset.blood.map_or(Ok(()), |blood| blood.validate())?;
         Ok(preset)
     }
 
@@ -165,6 +198,14 @@ pub enum PresetError {
     /// A setting outside its limits.
     #[error(transparent)]
     Generator(#[from] GeneratorError),
+    /// Blood that no organ has.
+    #[error("the blood's {what} is {value}; it must be a finite number above 0")]
+    Blood {
+        /// Which number of the blood.
+        what: &'static str,
+        /// The value found.
+        value: f64,
+    },
     /// Text that is not a preset.
     #[cfg(feature = "serialize")]
     #[error("not a preset: {0}")]
@@ -308,6 +349,12 @@ mod tests {
         let outside = Preset::from_ron("(generator: Colonization((arterial: (direction_weight: 7.0))))")
             .map_err(|e| e.to_string());
         assert!(outside.is_err_and(|text| text.contains("direction_weight is 7")));
+        let beyond = "(generator: Colonization((arterial: (terminal_radius: 1e38))))";
+        assert!(Preset::from_ron(beyond).is_err_and(|error| error.to_string().contains("terminal_radius is 1")));
+        for (blood, name) in [("flow: (-1.0), diameter: 0.1", "flow"), ("flow: (1e-6), diameter: 0", "diameter")] {
+            let refused = Preset::from_ron(&format!("(blood: ({blood}))"));
+            assert!(refused.is_err_and(|error| error.to_string().contains(name)), "{blood}");
+        }
         for garbage in ["", "(", "\u{0}\u{1}", "[1, 2]", "(generator: Colonization((steps: -1)))"] {
             assert!(Preset::from_ron(garbage).is_err(), "{garbage:?}");
         }

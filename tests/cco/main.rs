@@ -2,6 +2,7 @@
 //! OpenCCO gives.
 
 mod beyond;
+mod extremes;
 mod files;
 mod oracle;
 mod organs;

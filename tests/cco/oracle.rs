@@ -4,6 +4,7 @@ use bevy_math::DVec3;
 use bevy_vessels::synthesis::{
     cco::{Cco, VesselFlow},
     growth::Growth,
+    tissue::Extent,
     tree::{VesselKind, VesselTree},
 };
 
@@ -108,9 +109,9 @@ fn check_flow(name: &str, growth: &Cco, kind: VesselKind) {
     let extent = growth.tissue().extent();
     let share = f64::from(settings.perfusion);
     let scale = match extent {
-        bevy_vessels::synthesis::tissue::Extent::Volume(volume) => (share / f64::from(volume)).cbrt(),
-        bevy_vessels::synthesis::tissue::Extent::Area(area) => (share / f64::from(area)).sqrt(),
-        bevy_vessels::synthesis::tissue::Extent::Length(_) => unreachable!("it has no inside"),
+        Extent::Volume(volume) | Extent::Sheet { volume, .. } => (share / f64::from(volume)).cbrt(),
+        Extent::Area(area) => (share / f64::from(area)).sqrt(),
+        Extent::Length(_) => unreachable!("it has no inside"),
     };
     let mut terminals = vec![0u32; tree.len()];
     for tip in tree.tips().into_iter().map(|tip| tip as usize) {

@@ -254,7 +254,7 @@ fn an_organs_mesh_grows_on_its_surface_in_its_volume_and_in_stages() {
     let folder = Folder::new("mesh");
     let path = tetrahedron(&folder);
     let mut hashes = Vec::new();
-    for mode in ["surface", "volume", "staged"] {
+    for mode in ["surface", "lining", "volume", "staged"] {
         // A volume needs more drains than a surface for vessels to perceive them.
         let options = ["--tissue", &path, "--mode", mode, "--steps=25", "--samples=1000", "--lengths=2", "--count=3"];
         let lines = generate(&[&options[..], &["--threads=3"]].concat());

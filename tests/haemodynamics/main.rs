@@ -6,3 +6,8 @@ mod incremental;
 mod joined;
 mod laws;
 mod trees;
+mod wounded;
+
+#[cfg(feature = "mesh_files")]
+#[path = "../common/shared.rs"]
+mod shared;

@@ -1,9 +1,11 @@
 //! Tissues against oracles: analytic moments, brute force, and meshes of known volume.
 
 mod awkward;
+mod crossed;
 mod fields;
 mod no_go;
 mod sources;
+mod thin;
 mod volume;
 
 use bevy_math::{

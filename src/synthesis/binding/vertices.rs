@@ -8,7 +8,8 @@ use crate::synthesis::mesh::{TriangleMesh, Welding, unit};
 use crate::synthesis::{pace::Pace, parallel};
 use bevy_math::{Vec3, Vec3A};
 
-/// Share of the summed areas below which the sum of their normals is rounding.
+/// Share of the summed areas below which the sum of their normals is rounding. Areas are f32 here, so it is more than that
+/// of a mesh at rest, whose areas are f64.
 const CANCELLED_SHARE: f64 = 1.0e-5;
 
 /// Fewest triangles, vertices, or groups of four nodes, worth handing to another thread.

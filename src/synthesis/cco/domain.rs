@@ -49,7 +49,7 @@ impl Domain {
                 tissue: match tissue.extent() {
                     Extent::Length(_) => "a curve",
                     Extent::Area(_) => "a curved surface, or an area whose border is not known,",
-                    Extent::Volume(_) => "a volume whose border is not known",
+                    Extent::Volume(_) | Extent::Sheet { .. } => "a volume whose border is not known",
                 },
             });
         }
@@ -60,7 +60,7 @@ impl Domain {
                 let (x, y) = normal.any_orthonormal_pair();
                 (2, f64::from(area), [x, y, normal].map(|axis| axis.as_dvec3()))
             }
-            Extent::Volume(volume) => (3, f64::from(volume), DVec3::AXES),
+            Extent::Volume(volume) | Extent::Sheet { volume, .. } => (3, f64::from(volume), DVec3::AXES),
         };
         // The box along the axes around all corners of the bounds.
         let corners = (0..8).map(|corner: usize| {

@@ -272,7 +272,7 @@ impl ColonizationSettings {
     /// An organ of 0.3 m and the same organ of 300 mm then grow alike, except for rounding.
     #[must_use]
     pub fn fit(self, extent: Extent) -> Self {
-        let factor = if let Extent::Volume(_) = extent { Self::VOLUME_FACTOR } else { 1.0 };
+        let factor = if extent.is_solid() { Self::VOLUME_FACTOR } else { 1.0 };
         self.scaled(extent.equivalent_diameter() * factor)
     }
 }

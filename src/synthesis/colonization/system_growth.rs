@@ -172,6 +172,7 @@ impl SystemGrowth {
             // Not every node near a candidate supplies it.
             let drains = Blockers::new([(drains, drain_birth)]);
             drains.mark_beside(candidates, refused);
+            nodes.mark_beside_of(candidates, node_birth, refused, |node, place| !self.forest.is_steep(node, place));
             for (&candidate, refused) in candidates.iter().zip(refused).filter(|(_, refused)| !**refused) {
                 *refused = drains.any(candidate)
                     || nodes.any_within(candidate, node_birth) && self.supplies(candidate, ground);
@@ -188,13 +189,10 @@ impl SystemGrowth {
     /// Whether a node within the birth distance of a place is on the same side of the surface.
     fn supplies(&self, place: Vec3, ground: Ground<'_>) -> bool {
         let (forest, reach) = (&self.forest, self.lengths.node_birth);
-        let mut beside = false;
-        forest.index().for_each_within(place, reach, |node, _| beside |= !forest.is_steep(node, place));
         // A search for the side of the place is seldom needed.
-        beside || {
-            let (side, mut seen) = (ground.side(place), false);
-            forest.index().for_each_within(place, reach, |node, _| seen |= forest.supplies(node, side));
-            seen
+        forest.index().any_of_within(place, reach, |node| !forest.is_steep(node, place)) || {
+            let side = ground.side(place);
+            forest.index().any_of_within(place, reach, |node| forest.supplies(node, side))
         }
     }
 

@@ -39,8 +39,11 @@ pub struct Circulation {
 }
 
 impl Circulation {
-    /// Passes of the conjugate gradients after which they count as failed; ten to eighty are usual.
+    /// Passes of the conjugate gradients after which they count as failed; ten to eighty are usual. Without rounding they
+    /// need no more passes than there are linked nodes, and so many are needed if the bed resists far less than vessels.
     const MOST_PASSES: usize = 500;
+    /// Passes more, for each linked node.
+    const MOST_PASSES_PER_NODE: usize = 4;
     /// Imbalance of a linked node, relative to the largest flow in a link, and correction of its pressure, relative to
     /// the largest, at which the conjugate gradients end.
     const ACCURACY: f64 = 1e-12;
@@ -285,6 +288,7 @@ impl Circulation {
         // `image` is the arteries' matrix times `direction`.
         let (mut direction, mut image) = (z.clone(), residual.clone());
         let mut product = dot(&residual, &z);
+        let most = Self::MOST_PASSES + Self::MOST_PASSES_PER_NODE * residual.len();
         let mut passes = 0;
         while largest(&residual) > tolerated.flow || largest(&z) > tolerated.pressure {
             pace.rest(0.0).await;
@@ -293,7 +297,7 @@ impl Circulation {
             arteries.carry(veins, *conductance, &answer, &mut carried);
             arteries.excuse_roots(arterial, &mut carried);
             let curvature: f64 = direction.iter().zip(image.iter().zip(&carried)).map(|(d, (i, c))| d * (i - c)).sum();
-            if passes == Self::MOST_PASSES || !(curvature > 0.0) {
+            if passes == most || !(curvature > 0.0) {
                 let residual = tolerated.accuracy * largest(&residual) / tolerated.flow;
                 return Err(FlowError::NotConverged { what: "the flow through the bed", passes, residual });
             }

@@ -24,7 +24,12 @@ impl SurfacePoint {
     /// # Panics
     /// If there is no such triangle.
     pub(crate) fn on(mesh: &TriangleMesh, triangle: usize, point: Vec3) -> Self {
-        let (weights, position) = closest_on_triangle(point, mesh.corners(triangle));
+        Self::of(mesh.corners(triangle), triangle, point)
+    }
+
+    /// The point of a triangle with these corners nearest to `point`.
+    pub(crate) fn of(corners: [Vec3; 3], triangle: usize, point: Vec3) -> Self {
+        let (weights, position) = closest_on_triangle(point, corners);
         let distance_squared = (position - point.as_dvec3()).length_squared() as f32;
         Self { position: position.as_vec3(), triangle, barycentric: weights.as_vec3(), distance_squared }
     }
@@ -73,6 +78,11 @@ impl TriangleIndex {
 
     /// The point of the mesh nearest to `point`, if it is at most `radius` away.
     pub fn closest_within(&self, point: Vec3, radius: f32) -> Option<SurfacePoint> {
+        self.closest_of(point, radius, |_| true)
+    }
+
+    /// The same, of the triangles that `accepts` their number.
+    pub(crate) fn closest_of(&self, point: Vec3, radius: f32, accepts: impl Fn(usize) -> bool) -> Option<SurfacePoint> {
         let mut found: Option<SurfacePoint> = None;
         if !point.is_finite() {
             return None;
@@ -89,7 +99,7 @@ impl TriangleIndex {
                 None => distance_squared <= best,
                 Some(found) => (distance_squared, triangle) < (best, found.triangle),
             };
-            if !nearer {
+            if !(nearer && accepts(triangle)) {
                 return best;
             }
             let (position, barycentric) = (position.as_vec3(), weights.as_vec3());
@@ -97,6 +107,11 @@ impl TriangleIndex {
             distance_squared
         });
         found
+    }
+
+    /// Numbers of the indexed triangles in the mesh, in no particular order.
+    pub(crate) fn triangles(&self) -> &[u32] {
+        &self.triangles
     }
 
     /// Whether any point of the mesh is at most `radius` away.

@@ -5,7 +5,7 @@ use crate::synthesis::pace::{Pace, at_once};
 use bevy_math::{DVec3, Vec3};
 
 /// Share of the summed areas below which the sum of their normals is rounding: they cancel out.
-pub(crate) const CANCELLED_SHARE: f64 = 1.0e-6;
+const CANCELLED_SHARE: f64 = 1.0e-6;
 
 impl TriangleMesh {
     /// Unit normal of every vertex: the mean over its triangles, weighted by their area.

@@ -5,7 +5,7 @@ use crate::synthesis::{
     pace::{Pace, at_once},
     random::VesselRng,
     tissue::{
-        Derived, Extent, NoGoField, Tissue, TissuePiece, TissuePoint,
+        Derived, Extent, Tissue, TissuePiece, TissuePoint,
         error::{TissueError, finite_point, positive},
     },
 };
@@ -159,6 +159,10 @@ impl DensityTissue {
 }
 
 impl Tissue for DensityTissue {
+    fn laid_over(&self) -> Option<&dyn Tissue> {
+        Some(&*self.tissue)
+    }
+
     fn bounds(&self) -> Aabb3d {
         self.tissue.bounds()
     }
@@ -177,29 +181,6 @@ impl Tissue for DensityTissue {
 
     fn closest_point(&self, point: Vec3) -> TissuePoint {
         self.tissue.closest_point(point)
-    }
-
-    fn has_facets(&self) -> bool {
-        self.tissue.has_facets()
-    }
-
-    fn walk(
-        &self,
-        from: &TissuePoint,
-        direction: Vec3,
-        length: f32,
-        tolerance: f32,
-        arrive: &mut dyn FnMut(TissuePoint),
-    ) {
-        self.tissue.walk(from, direction, length, tolerance, arrive);
-    }
-
-    fn depth(&self, point: Vec3) -> Option<f32> {
-        self.tissue.depth(point)
-    }
-
-    fn depth_is_searched(&self) -> bool {
-        self.tissue.depth_is_searched()
     }
 
     fn density(&self, point: Vec3) -> f32 {
@@ -223,13 +204,5 @@ impl Tissue for DensityTissue {
         // Surfaces use two of the three numbers.
         let point = self.tissue.point_of(reach, piece, numbers)?;
         (numbers[2] < self.field.at(point)).then_some(point)
-    }
-
-    fn entrance(&self) -> Option<Vec3> {
-        self.tissue.entrance()
-    }
-
-    fn no_go(&self) -> Option<&NoGoField> {
-        self.tissue.no_go()
     }
 }

@@ -47,17 +47,6 @@ pub enum TissueError {
         /// Voxels along the longest side.
         resolution: u32,
     },
-    /// A mesh whose inside is so thin that voxels of this size can hardly find it.
-    #[error(
-        "what the mesh encloses fills {share} of the voxels that hold it at a resolution of {resolution}: it is too thin; \
-        raise the resolution, or grow on the surface instead"
-    )]
-    TooThin {
-        /// The share that it fills.
-        share: f32,
-        /// Voxels along the longest side.
-        resolution: u32,
-    },
     /// A length that must not be below zero.
     #[error("{what} is {value}; it must be at least 0")]
     Negative {

@@ -96,10 +96,33 @@ pub enum Extent {
     Area(f32),
     /// A solid, of this volume in cubic tissue lengths.
     Volume(f32),
+    /// A solid so thin for its width that usual spacings of vessels leave room for one layer of them.
+    Sheet {
+        /// Its volume in cubic tissue lengths.
+        volume: f32,
+        /// Its mean thickness in tissue lengths: twice the volume over the area of its surface.
+        thickness: f32,
+    },
 }
 
 impl Extent {
-    /// Diameter of the segment, disc or ball of the same size, in tissue lengths.
+    /// Thickness below which a solid is a sheet, in diameters of the ball of the same volume: about the distance between
+    /// drains in the paper's ball.
+    pub const SHEET: f32 = 1.0 / 32.0;
+
+    /// The extent of a solid with this volume and area of its surface.
+    pub fn solid(volume: f32, area: f32) -> Self {
+        let (whole, thickness) = (Self::Volume(volume), 2.0 * volume / area);
+        if thickness < Self::SHEET * whole.equivalent_diameter() { Self::Sheet { volume, thickness } } else { whole }
+    }
+
+    /// Whether it is that of a solid, thick or thin.
+    pub fn is_solid(self) -> bool {
+        matches!(self, Self::Volume(_) | Self::Sheet { .. })
+    }
+
+    /// Diameter of the segment, disc or ball of the same size, in tissue lengths. A sheet takes as many vessels as a ball
+    /// of this diameter, with the same distances between them.
     ///
     /// The settings of a preset are made for a tissue whose equivalent diameter is 1.
     pub fn equivalent_diameter(self) -> f32 {
@@ -108,12 +131,25 @@ impl Extent {
             Self::Length(length) => length,
             Self::Area(area) => 2.0 * (area / PI).sqrt(),
             Self::Volume(volume) => bevy_math::ops::cbrt(6.0 * volume / PI),
+            // Points `s` apart are V/s³ in a ball and V/(t·s²) in a sheet: s² = s_ball³/t, with s = SHEET · d.
+            Self::Sheet { volume, thickness } => {
+                let ball = Self::Volume(volume).equivalent_diameter();
+                ball * (Self::SHEET * ball / thickness).sqrt()
+            }
         }
     }
 }
 
 /// The space that vessels supply.
 pub trait Tissue: Debug + Send + Sync {
+    /// The tissue whose shape this one keeps, with something laid over it; `None` for a tissue with a shape of its own.
+    ///
+    /// What is said of the shape, and what this tissue doesn't say itself, is then what that one says. Its samples are
+    /// this tissue's own: a tissue that can be [cut](Self::cut) says so itself, as its pieces must be sampled alike.
+    fn laid_over(&self) -> Option<&dyn Tissue> {
+        None
+    }
+
     /// A box that holds the whole tissue.
     fn bounds(&self) -> Aabb3d;
 
@@ -131,7 +167,7 @@ pub trait Tissue: Debug + Send + Sync {
 
     /// Whether points of the tissue lie on [facets](TissuePoint::facet).
     fn has_facets(&self) -> bool {
-        false
+        self.laid_over().is_some_and(|tissue| tissue.has_facets())
     }
 
     /// Goes a `length` from a point of the tissue in a unit direction, keeping to the tissue. Calls `arrive` for each
@@ -146,23 +182,26 @@ pub trait Tissue: Debug + Send + Sync {
         from: &TissuePoint,
         direction: Vec3,
         length: f32,
-        _tolerance: f32,
+        tolerance: f32,
         arrive: &mut dyn FnMut(TissuePoint),
     ) {
-        arrive(self.closest_point(from.position + direction * length));
+        match self.laid_over() {
+            Some(tissue) => tissue.walk(from, direction, length, tolerance, arrive),
+            None => arrive(self.closest_point(from.position + direction * length)),
+        }
     }
 
     /// Distance of a point from the border of an area or a volume: positive inside, negative outside.
     ///
     /// It may be less than the distance, never more, and changes by no more than the way between two points. `None` for
     /// a tissue without an inside, such as a curved surface or a curve, and for one that doesn't know its border.
-    fn depth(&self, _point: Vec3) -> Option<f32> {
-        None
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        self.laid_over().and_then(|tissue| tissue.depth(point))
     }
 
     /// Whether [`depth`](Self::depth) searches, so that a caller with many points should keep a grid of it.
     fn depth_is_searched(&self) -> bool {
-        false
+        self.laid_over().is_some_and(|tissue| tissue.depth_is_searched())
     }
 
     /// Draws one candidate for an attraction point, uniformly by length, area or volume.
@@ -173,13 +212,13 @@ pub trait Tissue: Debug + Send + Sync {
 
     /// Relative density of attraction points or terminals at a point, from 0 to 1: the probability with which
     /// [`sample`](Self::sample) keeps it.
-    fn density(&self, _point: Vec3) -> f32 {
-        1.0
+    fn density(&self, point: Vec3) -> f32 {
+        self.laid_over().map_or(1.0, |tissue| tissue.density(point))
     }
 
     /// Whether [`density`](Self::density) is 1 everywhere.
     fn is_uniform(&self) -> bool {
-        true
+        self.laid_over().is_none_or(|tissue| tissue.is_uniform())
     }
 
     /// Appends `count` candidates, less those that failed, as by `count` calls of [`sample`](Self::sample). A tissue
@@ -211,7 +250,7 @@ pub trait Tissue: Debug + Send + Sync {
 
     /// The natural entrance of vessels to the tissue, if there is one: the beginning of a guide.
     fn entrance(&self) -> Option<Vec3> {
-        None
+        self.laid_over().and_then(|tissue| tissue.entrance())
     }
 
     /// Where no vessel may be; `None` if vessels may be everywhere.
@@ -220,7 +259,7 @@ pub trait Tissue: Debug + Send + Sync {
     /// give no point that this forbids. A generator places no node there; [`closest_point`](Self::closest_point)
     /// ignores it.
     fn no_go(&self) -> Option<&NoGoField> {
-        None
+        self.laid_over().and_then(|tissue| tissue.no_go())
     }
 
     /// The tissue that replaces this one at a growth step, counted from 1; `None` if this one stays.

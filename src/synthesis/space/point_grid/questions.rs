@@ -1,7 +1,7 @@
 //! Queries of a point grid: whether any point is near, the nearest one, and all points around a position.
 
 use crate::synthesis::space::point_grid::brick::{COLUMNS, EMPTY, LAYERS, ROWS, SIDE, range};
-use crate::synthesis::space::point_grid::{Blockers, PointGrid};
+use crate::synthesis::space::point_grid::{Blockers, PointGrid, together::BATCH};
 use bevy_math::{UVec3, Vec3, Vec4};
 
 impl PointGrid {
@@ -36,7 +36,7 @@ impl PointGrid {
     }
 
     /// Visits the points within a radius that may shrink on the way: `visit(id, squared distance)` returns the squared
-    /// radius from then on. The centre's own cell comes first, the others in no particular order.
+    /// radius from then on, and below 0 to end. The centre's own cell comes first, the others in no particular order.
     #[inline]
     fn scan(&self, center: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> f32) {
         if self.points.is_empty() {
@@ -46,12 +46,15 @@ impl PointGrid {
         let local = self.local(center);
         let own = self.head(self.cell_at(local));
         self.scan_chain(own, center, &mut limit, &mut visit);
+        if limit < 0.0 {
+            return;
+        }
         let (low, high) = self.cells_around(local, radius.min(limit.sqrt()));
         self.for_cells(low, high, |head| {
             if head != own {
                 self.scan_chain(head, center, &mut limit, &mut visit);
             }
-            true
+            limit >= 0.0
         });
     }
 
@@ -100,6 +103,43 @@ impl PointGrid {
     /// [`Blockers::mark_beside`].
     pub fn mark_beside(&self, centers: &[Vec3], radius: f32, marks: &mut [bool]) {
         Blockers::new([(self, radius)]).mark_beside(centers, marks);
+    }
+
+    /// The same with points that `accepts` for a centre, given their id.
+    pub fn mark_beside_of(
+        &self,
+        centers: &[Vec3],
+        radius: f32,
+        marks: &mut [bool],
+        accepts: impl Fn(u32, Vec3) -> bool,
+    ) {
+        let limit = Vec4::splat(radius * radius);
+        let mut heads = [EMPTY; BATCH];
+        for (centers, marks) in centers.chunks(BATCH).zip(marks.chunks_mut(BATCH)) {
+            for (head, &center) in heads.iter_mut().zip(centers) {
+                *head = self.head(self.cell_of(center));
+            }
+            for ((&head, &center), mark) in heads.iter().zip(centers).zip(marks) {
+                for block in [head, self.next[head as usize]].map(|block| &self.blocks[block as usize]) {
+                    let mut near = block.distances(center).cmple(limit).bitmask();
+                    while near != 0 && !*mark {
+                        let lane = near.trailing_zeros() as usize;
+                        *mark = accepts(block.ids[lane], center);
+                        near &= near - 1;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a point lies within `radius` of `center` that `accepts` its id.
+    pub fn any_of_within(&self, center: Vec3, radius: f32, accepts: impl Fn(u32) -> bool) -> bool {
+        let (limit, mut found) = (radius * radius, false);
+        self.scan(center, radius, |id, _| {
+            found = accepts(id);
+            if found { -1.0 } else { limit }
+        });
+        found
     }
 
     /// Calls `visit(id, squared distance)` for every point within `radius`, in no particular order.

@@ -48,7 +48,7 @@ fn answers_equal_brute_force() {
     for seed in 0..6 {
         let (mut grid, twin) = grid(seed, seed % 2 == 0);
         let mut rng = Stream::Roots.rng(seed);
-        let mut marked = 0;
+        let (mut marked, mut some_marked) = (0, 0);
         for cell in [0.07, 0.021, 0.4] {
             grid.resize_cells(cell);
             for _ in 0..200 {
@@ -63,6 +63,11 @@ fn answers_equal_brute_force() {
                 marked += u32::from(marks[0]);
                 let odd = brute_nearest(&twin, center, radius, 3);
                 assert_eq!(grid.nearest_within(center, radius, |id| id % 3 == 0), odd);
+                assert_eq!(grid.any_of_within(center, radius, |id| id % 3 == 0), odd.is_some());
+                let mut marks = [false, true];
+                grid.mark_beside_of(&[center, center], radius, &mut marks, |id, at| id % 3 == 0 && at == center);
+                assert!(marks[1] && (!marks[0] || odd.is_some()));
+                some_marked += u32::from(marks[0]);
                 let mut count = 0;
                 grid.for_each_within(center, radius, |_, _| count += 1);
                 let all = twin.iter().flatten().filter(|p| p.distance_squared(center) <= radius * radius).count();
@@ -70,6 +75,7 @@ fn answers_equal_brute_force() {
             }
         }
         assert!(marked > 20, "only {marked} were found in their own cells");
+        assert!(some_marked > 5, "only {some_marked} of every third were found in their own cells");
     }
 }
 

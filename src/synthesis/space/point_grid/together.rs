@@ -5,7 +5,7 @@ use crate::synthesis::space::point_grid::brick::{CELLS, EMPTY, SIDE};
 use bevy_math::{BVec4A, UVec3, Vec3, Vec4};
 
 /// Questions processed at once.
-const BATCH: usize = 32;
+pub(super) const BATCH: usize = 32;
 
 /// Whether a centre has a point within reach in any of several grids, each with a reach of its own. The grids have
 /// [equal cells](PointGrid::has_cells_of).

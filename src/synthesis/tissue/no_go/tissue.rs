@@ -41,6 +41,10 @@ impl NoGoTissue {
 }
 
 impl Tissue for NoGoTissue {
+    fn laid_over(&self) -> Option<&dyn Tissue> {
+        Some(&*self.tissue)
+    }
+
     fn bounds(&self) -> Aabb3d {
         self.tissue.bounds()
     }
@@ -61,40 +65,9 @@ impl Tissue for NoGoTissue {
         self.tissue.closest_point(point)
     }
 
-    fn has_facets(&self) -> bool {
-        self.tissue.has_facets()
-    }
-
-    fn walk(
-        &self,
-        from: &TissuePoint,
-        direction: Vec3,
-        length: f32,
-        tolerance: f32,
-        arrive: &mut dyn FnMut(TissuePoint),
-    ) {
-        self.tissue.walk(from, direction, length, tolerance, arrive);
-    }
-
-    fn depth(&self, point: Vec3) -> Option<f32> {
-        self.tissue.depth(point)
-    }
-
-    fn depth_is_searched(&self) -> bool {
-        self.tissue.depth_is_searched()
-    }
-
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         let point = self.tissue.sample(rng);
         self.allowed(point)
-    }
-
-    fn density(&self, point: Vec3) -> f32 {
-        self.tissue.density(point)
-    }
-
-    fn is_uniform(&self) -> bool {
-        self.tissue.is_uniform()
     }
 
     fn draw(&self, rng: &mut VesselRng, count: u32, candidates: &mut Vec<Vec3>) {
