@@ -1,8 +1,8 @@
 //! Organs in the scene of a glTF file: meshes with a name get vessels, wherever in the scene they are.
 //!
 //! `--glb FILE --name NAME` takes a file of your own, about one metre large; without it, the example writes one with a
-//! liver and its cast. Keys as on the screen. `--headless --out DIR` writes `gltf_scene.png`, which is also the behaviour
-//! without a display.
+//! liver and its cast. Keys as on the screen. `--headless --out DIR` writes `gltf_scene.png`, which is also the
+//! behaviour without a display.
 
 mod common;
 
@@ -97,7 +97,8 @@ fn glb(mesh: &ShadedMesh, nodes: serde_json::Value) -> Vec<u8> {
     let vertices = mesh.positions.len();
     let primitive =
         |material| json!({ "attributes": { "POSITION": 0, "NORMAL": 1 }, "indices": 2, "material": material });
-    let material = |color: [f32; 4]| json!({ "pbrMetallicRoughness": { "baseColorFactor": color, "metallicFactor": 0.0, "roughnessFactor": 0.45 } });
+    let look = |color: [f32; 4]| json!({ "baseColorFactor": color, "metallicFactor": 0.0, "roughnessFactor": 0.45 });
+    let material = |color| json!({ "pbrMetallicRoughness": look(color) });
     let document = json!({
         "asset": { "version": "2.0" },
         "scene": 0,

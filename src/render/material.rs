@@ -72,8 +72,8 @@ impl MaterialExtension for SegmentExtension {
     }
 }
 
-/// Gives a material made from a template the opacity of a kind's colour. A translucent one is blended, unless the template
-/// says how.
+/// Gives a material made from a template the opacity of a kind's colour. A translucent one is blended, unless the
+/// template says how.
 pub(super) fn set_opacity(material: &mut StandardMaterial, template: &StandardMaterial, opacity: f32) {
     material.base_color.set_alpha(template.base_color.alpha() * opacity);
     let is_translucent = opacity < 1.0 && template.alpha_mode == AlphaMode::Opaque;

@@ -14,9 +14,9 @@
 //! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often:
 //! vessels grow everywhere at once, so even 256 consecutive segments reach over three quarters of an organ.
 //!
-//! `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver` of an organ or a vessel entity hold for all that is drawn of
-//! its vessels, from the frame on in which they change. A vessel entity's own layers take the place of its organ's. An
-//! alpha below 1 in [`VesselAppearance::colors`] makes vessels translucent.
+//! `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver` of an organ or a vessel entity hold for all that is drawn
+//! of its vessels, from the frame on in which they change. A vessel entity's own layers take the place of its organ's.
+//! An alpha below 1 in [`VesselAppearance::colors`] makes vessels translucent.
 //!
 //! A translucent organ casts the same shadow as an opaque one in Bevy, and vessels inside are dark in it: give it
 //! `NotShadowCaster`.

@@ -34,8 +34,8 @@ pub struct BleedingStarted {
     pub entity: Entity,
 }
 
-/// An open end stops bleeding: it has clotted, has no pressure left, was closed, its vessels are gone, or its organ lost
-/// its [`Perfusion`](crate::plugin::Perfusion). Also an event on the organ, for observers.
+/// An open end stops bleeding: it has clotted, has no pressure left, was closed, its vessels are gone, or its organ
+/// lost its [`Perfusion`](crate::plugin::Perfusion). Also an event on the organ, for observers.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Message, Event, Clone, PartialEq)]
 pub struct BleedingStopped {

@@ -25,10 +25,11 @@ use bevy::{
 ///
 /// Flow is that of the organ at rest: neither its transform nor its deformation changes it.
 ///
-/// Vessels alone let through many times what an organ takes: litres a minute in a colon. Presets that know their organ's
-/// blood, in [`Vasculature::blood`](crate::plugin::Vasculature::blood), give a physiological flow: unless
+/// Vessels alone let through many times what an organ takes: litres a minute in a colon. Presets that know their
+/// organ's blood, in [`Vasculature::blood`](crate::plugin::Vasculature::blood), give a physiological flow: unless
 /// [`scale`](Self::scale) and [`bed`](Self::bed) are given, the organ has the size of such an organ, and its bed the
-/// resistance at which it takes that flow once its vessels have grown. Without such a preset, give the bed a resistance.
+/// resistance at which it takes that flow once its vessels have grown. Without such a preset, give the bed a
+/// resistance.
 ///
 /// Time is that of Bevy's generic clock. Its virtual time counts at most a quarter of a second of a frame, unless an app
 /// sets another `max_delta` of [`Time<Virtual>`](bevy::time::Virtual): in longer frames blood loses time, as all does that

@@ -88,8 +88,8 @@ impl CirculationState {
         &self.bleeding[kind]
     }
 
-    /// Length of a unit of the organ's mesh for its blood: the one that is given, or that of the preset; `None` before the
-    /// first flow.
+    /// Length of a unit of the organ's mesh for its blood: the one that is given, or that of the preset; `None` before
+    /// the first flow.
     pub fn scale(&self) -> Option<Scale> {
         let (hydraulics, _) = self.made_with.as_ref()?;
         hydraulics.settings.artery.as_ref().map(|settings| settings.scale)

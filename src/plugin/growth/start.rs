@@ -80,7 +80,8 @@ impl StartOrder {
         Ok(StartedGrowth { tissue, growth })
     }
 
-    /// Starts the growth now, in place of another one, whose memory is reused if possible. The tissue must have its paint.
+    /// Starts the growth now, in place of another one, whose memory is reused if possible. The tissue must have its
+    /// paint.
     pub(crate) fn carry_out_now(self, before: Option<Box<dyn Growth>>) -> StartedGrowth {
         let Self { tissue, settings, seed, .. } = self;
         StartedGrowth { growth: start(&tissue, settings, seed, before), tissue }

@@ -150,8 +150,8 @@ pub(crate) enum Found {
 }
 
 impl OrganAssets<'_> {
-    /// Finds the tissue of an organ, or copies what it is to be made from. If the organ `may_wait`, a tissue that is being
-    /// prepared for another one serves.
+    /// Finds the tissue of an organ, or copies what it is to be made from. If the organ `may_wait`, a tissue that is
+    /// being prepared for another one serves.
     pub(crate) fn find(
         &mut self,
         source: &TissueSource,

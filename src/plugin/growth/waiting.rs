@@ -21,7 +21,8 @@ use bevy::{
     mesh::Mesh3d,
 };
 
-/// Frames after which an organ that waits for something that nobody loads gets a warning. Scenes are spawned within fewer.
+/// Frames after which an organ that waits for something that nobody loads gets a warning. Scenes are spawned within
+/// fewer.
 const PATIENCE: u32 = 300;
 
 /// An organ that may wait.
@@ -70,8 +71,8 @@ pub(crate) fn warn_of_waiting(
                 );
             } else {
                 warn!(
-                    "{entity}: no vessels grow here: it has no Mesh3d; put the Vasculature on the entity with the mesh, or \
-                     choose a plain shape as its tissue"
+                    "{entity}: no vessels grow here: it has no Mesh3d; put the Vasculature on the entity with the mesh, \
+                     or choose a plain shape as its tissue"
                 );
             }
         }

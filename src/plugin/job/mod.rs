@@ -35,12 +35,12 @@ mod tests;
 
 pub use settings::{JobMode, JobSettings};
 
-/// The work on an organ panicked, in a job or in a step of its growth. That organ fails; the app and all other organs go
-/// on, unless the app is built to abort on panics.
+/// The work on an organ panicked, in a job or in a step of its growth. That organ fails; the app and all other organs
+/// go on, unless the app is built to abort on panics.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the work on it panicked ({message}), which is a fault of its custom generator, if it has one, or else of bevy_vessels; \
-     please report that with mesh and settings"
+    "the work on it panicked ({message}), which is a fault of its custom generator, if it has one, or else of \
+     bevy_vessels; please report that with mesh and settings"
 )]
 pub struct JobPanic {
     /// The message of the panic.

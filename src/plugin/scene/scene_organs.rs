@@ -20,13 +20,15 @@ use bevy::{
     reflect::{Reflect, std_traits::ReflectDefault},
 };
 
-/// Grows vessels on meshes of a scene: put it on the scene's root, beside a `WorldAssetRoot` with a scene of a glTF file.
-/// Once the scene has been spawned, each mesh that is meant gets a [`Vasculature`], on its own entity, and is an organ.
+/// Grows vessels on meshes of a scene: put it on the scene's root, beside a `WorldAssetRoot` with a scene of a glTF
+/// file. Once the scene has been spawned, each mesh that is meant gets a [`Vasculature`], on its own entity, and is an
+/// organ.
 ///
 /// Later changes of this change these vasculatures, too; removing it leaves them as they are. A mesh of several
 /// materials is as many entities in Bevy, each of which becomes an organ. All of them have the same seed.
 ///
-/// To add more to these organs, such as a [`Perfusion`](crate::plugin::Perfusion), observe where a `Vasculature` is added.
+/// To add more to these organs, such as a [`Perfusion`](crate::plugin::Perfusion), observe where a `Vasculature` is
+/// added.
 ///
 /// ```
 /// # use bevy_vessels::{plugin::{Vasculature, VasculatureOfScene}, synthesis::preset::PresetName};
@@ -82,8 +84,8 @@ impl VasculatureOfScene {
 impl SceneMeshes {
     /// Whether a mesh is meant whose entity, or one above it, has this name.
     ///
-    /// Bevy names the entity of a glTF mesh after the mesh, with a dot and its material. A number after a dot belongs to
-    /// the name, as in Blender.
+    /// Bevy names the entity of a glTF mesh after the mesh, with a dot and its material. A number after a dot belongs
+    /// to the name, as in Blender.
     fn mean(&self, name: &str) -> bool {
         let is_material = |rest: &str| rest.strip_prefix('.').is_some_and(|rest| !is_number(rest));
         match self {
@@ -176,9 +178,7 @@ fn warn_of_waiting(scene: Entity, wish: &mut Mut<VasculatureOfScene>, entities: 
             of_scene.iter().filter_map(|&mesh| entities.names.get(mesh).ok()).map(Name::as_str).collect();
         let meant = &wish.meshes;
         if of_scene.is_empty() {
-            warn!(
-                "{scene}: no vessels grow in this scene: it has no mesh; is it loaded, and a WorldAssetRoot beside this?"
-            );
+            warn!("{scene}: no vessels grow in this scene: it has no mesh; is a WorldAssetRoot beside this?");
         } else {
             warn!("{scene}: no vessels grow in this scene: {meant:?} means none of its meshes {names:?}");
         }

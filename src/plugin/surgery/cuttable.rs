@@ -32,12 +32,12 @@ pub struct Cuttable {
 pub enum WoundedGrowth {
     /// It rests, in [`GrowthPhase::Held`](crate::plugin::GrowthPhase::Held). So no vessel grows that would bleed or be
     /// supplied through one that is cut off, and no generator replaces the severed vessels. Once all of this has been
-    /// undone, growth goes on, and gives the vessels that it would have given without a cut. Clamps don't hold it, since
-    /// they are taken off again.
+    /// undone, growth goes on, and gives the vessels that it would have given without a cut. Clamps don't hold it,
+    /// since they are taken off again.
     #[default]
     Rests,
-    /// It goes on as if the vessels were whole. What is cut off grows, too, without blood. A generator that inserts nodes,
-    /// such as constrained constructive optimisation, replaces the vessels in its next step, and their wounds are
-    /// dropped.
+    /// It goes on as if the vessels were whole. What is cut off grows, too, without blood. A generator that inserts
+    /// nodes, such as constrained constructive optimisation, replaces the vessels in its next step, and their wounds
+    /// are dropped.
     GoesOn,
 }

@@ -49,7 +49,8 @@ use bevy::{
 /// ```
 #[derive(Resource, Debug)]
 pub struct CuttableVessels {
-    /// How many actions or strokes [`undo`](Self::undo) can take back. When there are more, the oldest become permanent.
+    /// How many actions or strokes [`undo`](Self::undo) can take back. When there are more, the oldest become
+    /// permanent.
     ///
     /// Higher values take more memory: about a hundred bytes for each segment that an action changed.
     /// [`undo_all`](Self::undo_all) needs no memory, and heals permanent ones, too.

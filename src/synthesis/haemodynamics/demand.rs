@@ -103,8 +103,8 @@ struct Search {
 }
 
 impl Search {
-    /// From above, since joined trees are harder to solve the less the bed resists. The first trial is far more than a bed
-    /// of a million terminals needs. `drop` is the pressure between roots and bed.
+    /// From above, since joined trees are harder to solve the less the bed resists. The first trial is far more than a
+    /// bed of a million terminals needs. `drop` is the pressure between roots and bed.
     fn new(flow: Flow, drop: f64) -> Result<Self, FlowError> {
         let wanted = flow.cubic_metres_per_second();
         FlowError::check_positive("the flow into the organ in mL/min", flow.ml_per_min())?;
