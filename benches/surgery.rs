@@ -83,7 +83,7 @@ fn organ(segments: usize) -> (App, Entity) {
     app.cleanup();
     let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Sphere::new(0.1).mesh().uv(SECTORS, SECTORS));
     let arterial_pressure = RootPressure::Pulsatile(Pulse::default());
-    let blood = Perfusion { scale: Scale::METRES, arterial_pressure, ..default() };
+    let blood = Perfusion { scale: Some(Scale::METRES), arterial_pressure, ..default() };
     let organ = (Mesh3d(mesh), Transform::default(), Visibility::default(), blood, FollowsMesh);
     let organ = app.world_mut().spawn(organ).id();
     let vessels = Vessels::from_tree(VesselKind::Artery, &tree(segments), &[]);

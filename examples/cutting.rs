@@ -89,7 +89,7 @@ fn main() -> AppExit {
 /// Blood under pulsatile pressure.
 fn perfusion() -> impl Bundle {
     let arterial_pressure = RootPressure::Pulsatile(Pulse::default());
-    (Perfusion { scale: Scale::METRES, arterial_pressure, ..default() }, FollowsMesh)
+    (Perfusion { scale: Some(Scale::METRES), arterial_pressure, ..default() }, FollowsMesh)
 }
 
 fn spawn_organ(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets) -> Result {

@@ -57,6 +57,11 @@
 //! **I need a closed mesh: to draw, to print or to compute with.** Put a [`VesselSurface`](plugin::VesselSurface) on the
 //! organ. [`SurfaceCommandsExt`](plugin::SurfaceCommandsExt) saves it.
 //!
+//! **The vessels in my translucent organ are dark.** They are in its shadow, which Bevy draws as that of an opaque
+//! mesh. Put `NotShadowCaster` on the organ. Vessels take that over, as they do its `RenderLayers`.
+//!
+//! **My organ is in a glTF scene.** Put a [`VasculatureOfScene`](plugin::VasculatureOfScene) on the scene's root.
+//!
 //! **Why does nothing grow?** Look at the entity's [`GrowthProgress`](plugin::GrowthProgress) and the log. They name an
 //! unusable mesh, or settings outside their limits, and say what to change.
 

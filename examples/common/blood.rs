@@ -75,7 +75,9 @@ struct Look {
 
 /// Metres of a world unit, so that drops have true speed and size relative to the organ.
 fn metres(organs: &Query<(&Perfusion, &Transform)>) -> f32 {
-    let unit = |(organ, place): (&Perfusion, &Transform)| organ.scale.metres() as f32 / place.scale.max_element();
+    let unit = |(organ, place): (&Perfusion, &Transform)| {
+        organ.scale.unwrap_or(Perfusion::DEFAULT_SCALE).metres() as f32 / place.scale.max_element()
+    };
     organs.iter().next().map_or(1.0, unit)
 }
 

@@ -119,9 +119,41 @@ fn any_file() -> AssetPlugin {
     AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() }
 }
 
-/// Whether a window can be opened.
+/// Whether a window can be opened. Without one, Bevy panics.
+#[cfg(target_os = "linux")]
 pub fn has_display() -> bool {
-    !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
+    let Ok(display) = std::env::var("DISPLAY") else { return false };
+    let answers = x_server_answers(&display);
+    if !answers && !display.is_empty() {
+        println!("no X server answers at DISPLAY={display}: set it to that of a running one, or try xvfb-run");
+    }
+    answers
+}
+
+/// Whether a window can be opened.
+#[cfg(not(target_os = "linux"))]
+pub fn has_display() -> bool {
+    true
+}
+
+/// Whether an X server listens where a display, such as `:0` or `host:10.0`, says.
+#[cfg(target_os = "linux")]
+fn x_server_answers(display: &str) -> bool {
+    use std::{
+        net::TcpStream,
+        os::{
+            linux::net::SocketAddrExt,
+            unix::net::{SocketAddr, UnixStream},
+        },
+    };
+    let Some((host, screen)) = display.rsplit_once(':') else { return false };
+    let Some(Ok(number)) = screen.split('.').next().map(str::parse::<u16>) else { return false };
+    if !host.is_empty() && host != "unix" {
+        return TcpStream::connect((host, number.saturating_add(6000))).is_ok();
+    }
+    let path = format!("/tmp/.X11-unix/X{number}");
+    let hidden = SocketAddr::from_abstract_name(&path).and_then(|address| UnixStream::connect_addr(&address));
+    UnixStream::connect(&path).is_ok() || hidden.is_ok()
 }
 
 fn spawn_camera(

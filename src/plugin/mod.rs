@@ -18,7 +18,7 @@
 //! | [`SurgeryPlugin`] | `surgery` | [`CuttableVessels`], [`VesselCommand`]s → [`VesselWounds`], [`OpenEnd`] entities |
 //! | [`CirculationPlugin`] | `circulation` | [`VesselWounds`] → flow, bleeding, supply of the tissue |
 //! | [`SurfacePlugin`] | `surface` | [`Vessels`], [`VesselWounds`] → [`VesselMesh`], files |
-//! | [`ScenePlugin`] | `scene` | [`PresetAsset`]s → [`Vasculature`]; organs saved in scenes |
+//! | [`ScenePlugin`] | `scene` | [`PresetAsset`]s, [`VasculatureOfScene`] → [`Vasculature`]; organs saved in scenes |
 //! | [`VesselsPlugin`] | `vessels` | what all the others need; they add it themselves |
 
 mod announcer;
@@ -47,7 +47,9 @@ pub use growth::{
 pub use job::{JobMode, JobPanic, JobSettings};
 pub use order::VesselSystems;
 pub use organ::{OrganImage, OrganImageError, OrganMeshError, RestMesh, triangle_mesh};
-pub use scene::{PresetAsset, PresetLoadError, PresetLoader, ScenePlugin, VesselPreset};
+pub use scene::{
+    PresetAsset, PresetLoadError, PresetLoader, SceneMeshes, ScenePlugin, VasculatureOfScene, VesselPreset,
+};
 pub use surface::{
     SurfaceAction, SurfaceCommand, SurfaceCommandsExt, SurfaceDetail, SurfaceFailed, SurfaceLevel, SurfaceMoment,
     SurfaceNotSaved, SurfacePlugin, SurfaceReady, SurfaceSaveError, SurfaceSaved, SurfaceShown, VesselMesh,
@@ -55,7 +57,7 @@ pub use surface::{
 };
 pub use surgery::{
     Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, Stroke, StrokeId,
-    SurgeryPlugin, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite,
+    SurgeryPlugin, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite, WoundedGrowth,
 };
 pub use vessels::{
     ChangeCursor, ChangeLog, Changes, OrganVessels, SegmentColoring, VesselAppearance, VesselIndex, VesselPicker,

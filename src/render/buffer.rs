@@ -37,6 +37,8 @@ pub struct SegmentBuffer {
     pub(super) colors: SegmentColors,
     /// The appearance that `colors` follow, `None` at first.
     look: Option<Look>,
+    /// The opacity that the material follows.
+    pub(super) opacity: f32,
     pub(super) warned_of_limit: bool,
     /// The remaining pieces of severed segments.
     pub(super) stumps: Stumps,
@@ -178,6 +180,7 @@ pub(super) fn attach_buffers(
             contents: Vec::new(),
             colors: SegmentColors::Uniform([1.0; 3]),
             look: None,
+            opacity: 1.0,
             warned_of_limit: false,
             room: stumps.room(),
             stumps,

@@ -72,6 +72,14 @@ impl MaterialExtension for SegmentExtension {
     }
 }
 
+/// Gives a material made from a template the opacity of a kind's colour. A translucent one is blended, unless the
+/// template says how.
+pub(super) fn set_opacity(material: &mut StandardMaterial, template: &StandardMaterial, opacity: f32) {
+    material.base_color.set_alpha(template.base_color.alpha() * opacity);
+    let is_translucent = opacity < 1.0 && template.alpha_mode == AlphaMode::Opaque;
+    material.alpha_mode = if is_translucent { AlphaMode::Blend } else { template.alpha_mode };
+}
+
 /// The initial materials of new vessel entities.
 ///
 /// Change this resource before vessels appear, or the material of one vessel entity at any time: see

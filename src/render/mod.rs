@@ -14,6 +14,13 @@
 //! each entity, view and shadow cascade is done a few hundred times. Smaller chunks would not be culled more often:
 //! vessels grow everywhere at once, so even 256 consecutive segments reach over three quarters of an organ.
 //!
+//! `RenderLayers`, `NotShadowCaster` and `NotShadowReceiver` of an organ or a vessel entity hold for all that is drawn
+//! of its vessels, from the frame on in which they change. A vessel entity's own layers take the place of its organ's.
+//! An alpha below 1 in [`VesselAppearance::colors`] makes vessels translucent.
+//!
+//! A translucent organ casts the same shadow as an opaque one in Bevy, and vessels inside are dark in it: give it
+//! `NotShadowCaster`.
+//!
 //! Once vessels have a closed mesh ([`VesselMesh`]), that is drawn in their place, by Bevy's
 //! standard material, in levels of detail that fade into each other.
 //!
@@ -23,8 +30,10 @@
 use crate::plugin::{SurfaceLevel, VesselAppearance, VesselMesh};
 use bevy::{
     asset::{AssetEventSystems, embedded_asset},
+    camera::visibility::RenderLayers,
     camera::{CameraUpdateSystems, visibility::VisibilitySystems},
-    ecs::schedule::common_conditions::{any_match_filter, any_with_component},
+    ecs::schedule::common_conditions::{any_component_removed, any_match_filter, any_with_component},
+    light::{NotShadowCaster, NotShadowReceiver},
     pbr::PbrPlugin,
     prelude::*,
     render::{
@@ -45,6 +54,7 @@ mod material;
 mod segments;
 mod stumps;
 mod surfaces;
+mod take_over;
 mod template;
 mod upload;
 
@@ -125,6 +135,7 @@ impl Default for SegmentRenderPlugin {
 
 impl Plugin for SegmentRenderPlugin {
     fn build(&self, app: &mut App) {
+        // Without a renderer, or before Bevy's own plugins: `finish` tells these apart.
         if app.get_sub_app(RenderApp).is_none() || !app.is_plugin_added::<PbrPlugin>() {
             return;
         }
@@ -174,8 +185,11 @@ impl Plugin for SegmentRenderPlugin {
                     ),
                 }
             }
-            (Some(_), ..) => warn!("vessels are not drawn: add the vessel plugin after DefaultPlugins, with PbrPlugin"),
-            (None, ..) => {}
+            // Plugins that were added later finish later: there may be no device yet.
+            (_, _, None) if app.get_sub_app(RenderApp).is_some() => {
+                warn!("vessels are not drawn: add the vessel plugin after DefaultPlugins, with PbrPlugin");
+            }
+            _ => {}
         }
     }
 }
@@ -190,6 +204,12 @@ fn build_surfaces(app: &mut App) {
         PostUpdate,
         (
             look.chain().before(AssetEventSystems),
+            take_over::take_over.after(SegmentSystems).before(TransformSystems::Propagate).run_if(
+                any_match_filter::<take_over::Restyled>
+                    .or_else(any_component_removed::<RenderLayers>)
+                    .or_else(any_component_removed::<NotShadowCaster>)
+                    .or_else(any_component_removed::<NotShadowReceiver>),
+            ),
             surfaces::range_levels
                 .after(TransformSystems::Propagate)
                 .before(VisibilitySystems::CheckVisibility)

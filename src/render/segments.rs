@@ -6,12 +6,15 @@ use super::{
     detail::ChunkMeshes,
     levels::FEWEST_SLOTS,
     limits::SegmentLimits,
-    material::SegmentMaterial,
+    material::{SegmentMaterial, VesselMaterials, set_opacity},
     upload::{SegmentWrite, SegmentWrites},
 };
 use crate::{
     plugin::{ChangeLog, Changes, SegmentSupply, VesselAppearance, VesselMesh, VesselWounds, Vessels, VesselsOf},
-    synthesis::instances::{SegmentInstance, segment_instance},
+    synthesis::{
+        instances::{SegmentInstance, segment_instance},
+        tree::VesselKind,
+    },
 };
 use bevy::{
     camera::{primitives::Aabb, visibility::NoAutoAabb},
@@ -31,6 +34,7 @@ pub(super) struct SegmentStore<'w, 's> {
     meshes: ResMut<'w, Assets<Mesh>>,
     writes: ResMut<'w, SegmentWrites>,
     templates: ResMut<'w, ChunkMeshes>,
+    looks: Res<'w, VesselMaterials>,
     limits: Res<'w, SegmentLimits>,
 }
 
@@ -68,7 +72,7 @@ pub(super) fn update_segments(
             continue;
         }
         let look = match appearance {
-            Some(appearance) => Look::new(&appearance, drawn.vessels.kind()),
+            Some(ref appearance) => Look::new(appearance, drawn.vessels.kind()),
             None => Look::new(&VesselAppearance::default(), drawn.vessels.kind()),
         };
         let (vessels, segments) = (&*drawn.vessels, &mut *drawn.segments);
@@ -78,6 +82,8 @@ pub(super) fn update_segments(
         let wounds = drawn.wounds.map(|wounds| &**wounds);
         segments.stumps.note(wounds, vessels, drawn.vessels.is_changed(), &mut changes);
         segments.adopt(look, vessels, supply, &mut changes);
+        let opacity = appearance.map_or(1.0, |appearance| appearance.colors[vessels.kind()].alpha());
+        store.set_opacity(opacity, vessels.kind(), segments);
         segments.stumps.update(wounds, vessels, &segments.colors, &changes, nodes);
         let len = store.drawable(drawn.entity, nodes, segments);
         store.resize(segments, len);
@@ -88,6 +94,16 @@ pub(super) fn update_segments(
 }
 
 impl SegmentStore<'_, '_> {
+    /// Makes vessels as opaque as their kind's colour, if that has changed.
+    fn set_opacity(&mut self, opacity: f32, kind: VesselKind, segments: &mut SegmentBuffer) {
+        if segments.opacity != opacity
+            && let Some(mut material) = self.materials.get_mut(&segments.material)
+        {
+            set_opacity(&mut material.base, &self.looks.0[kind], opacity);
+            segments.opacity = opacity;
+        }
+    }
+
     /// Number of `len` nodes that can be drawn beside the stumps; warns once if not all can.
     fn drawable(&self, entity: Entity, len: usize, segments: &mut SegmentBuffer) -> usize {
         let stumps = segments.stumps.room();

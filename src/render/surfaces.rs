@@ -6,7 +6,11 @@
 //! A mesh that is new may take some frames until the graphics card has it. Segments are hidden only after these, so that
 //! there is always something to see: until then both are drawn, in the same place and colour.
 
-use super::{buffer::SegmentBuffer, chunk::SegmentChunk, material::VesselMaterials};
+use super::{
+    buffer::SegmentBuffer,
+    chunk::SegmentChunk,
+    material::{VesselMaterials, set_opacity},
+};
 use crate::{
     plugin::{OrganVessels, SurfaceLevel, VesselAppearance, VesselMesh, VesselSurface, Vessels, VesselsOf},
     synthesis::tree::VesselKind,
@@ -31,9 +35,10 @@ pub(super) fn dress_levels(
         let kind = vessels.kind();
         let known = mesh.entities().iter().find_map(|&entity| dressed.get(entity).ok());
         let material = known.cloned().unwrap_or_else(|| {
-            let base = templates.0[kind].clone();
-            let base_color = tinted(&base, looks.get(of.0).ok(), kind);
-            MeshMaterial3d(materials.add(StandardMaterial { base_color, ..base }))
+            let base = &templates.0[kind];
+            let mut material = base.clone();
+            tint(&mut material, base, looks.get(of.0).ok(), kind);
+            MeshMaterial3d(materials.add(material))
         });
         for &entity in bare() {
             commands.entity(entity).try_insert(material.clone());
@@ -41,11 +46,17 @@ pub(super) fn dress_levels(
     }
 }
 
-/// The colour of a kind, multiplied by that of its material, as with segments.
-fn tinted(base: &StandardMaterial, look: Option<&VesselAppearance>, kind: VesselKind) -> Color {
+/// Gives a material the colour and opacity of a kind, multiplied by those of its template, as with segments.
+fn tint(
+    material: &mut StandardMaterial,
+    template: &StandardMaterial,
+    look: Option<&VesselAppearance>,
+    kind: VesselKind,
+) {
     let own = look.map_or(VesselAppearance::DEFAULT_COLORS[kind], |look| look.colors[kind]).to_linear();
-    let base = base.base_color.to_linear();
-    Color::linear_rgba(own.red * base.red, own.green * base.green, own.blue * base.blue, base.alpha)
+    let base = template.base_color.to_linear();
+    material.base_color = Color::linear_rgb(own.red * base.red, own.green * base.green, own.blue * base.blue);
+    set_opacity(material, template, own.alpha);
 }
 
 /// Recolours meshes when their organ's appearance changes.
@@ -58,12 +69,13 @@ pub(super) fn recolor_levels(
 ) {
     for (look, vessels) in &organs {
         for (mesh, vessels) in meshes.iter_many(vessels.entities()) {
-            let color = tinted(&templates.0[vessels.kind()], Some(look), vessels.kind());
+            let (kind, template) = (vessels.kind(), &templates.0[vessels.kind()]);
             for handle in mesh.entities().iter().filter_map(|&entity| dressed.get(entity).ok()) {
-                if materials.get(&handle.0).is_some_and(|material| material.base_color != color)
-                    && let Some(mut material) = materials.get_mut(&handle.0)
-                {
-                    material.base_color = color;
+                let Some(mut material) = materials.get(&handle.0).cloned() else { continue };
+                let before = (material.base_color, material.alpha_mode);
+                tint(&mut material, template, Some(look), kind);
+                if before != (material.base_color, material.alpha_mode) {
+                    materials.insert(handle.0.id(), material).ok();
                 }
             }
         }

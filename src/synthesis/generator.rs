@@ -192,6 +192,9 @@ impl From<ColonizationSettings> for Generator {
 }
 
 /// A generator of vessels outside this crate, for [`CustomGenerator`], which has an example.
+///
+/// In a Bevy world, a panic in [`start`](Self::start) or in a step of its growth fails the organ that it is for, and
+/// the app goes on, unless it is built to abort on panics. Elsewhere a panic reaches the caller.
 pub trait GrowthMaker: fmt::Debug + Send + Sync {
     /// The spacing of roots for each kind of vessels that it grows. All lengths must be multiplied by `scale`.
     ///

@@ -5,15 +5,16 @@ use super::*;
 use bevy_vessels::{
     plugin::{
         BleedingStarted, BleedingStopped, BloodLoss, CirculationFailed, CirculationState, Cuttable, CuttableVessels,
-        OpenEnd, OrganSupply, Patient, Perfusion, SegmentSupply,
+        GrowthStarted, OpenEnd, OrganSupply, Patient, Perfusion, SegmentSupply,
     },
     synthesis::{
         haemodynamics::{
             BedSettings, BleedingSettings, BloodVolumeSettings, EndState, FlowSettings, Pulse, RootPressure,
             ViscosityLaw,
         },
+        preset::OrganBlood,
         tree::{NodeId, Place},
-        units::{BLOOD_DENSITY, Pressure, Resistance, Scale, Viscosity, Volume},
+        units::{BLOOD_DENSITY, Flow, Pressure, Resistance, Scale, Viscosity, Volume},
         wound::{EndSide, Retraction},
     },
 };
@@ -27,7 +28,7 @@ fn plain() -> (Cuttable, Perfusion) {
         bleeding: BleedingSettings { clotting: None, ..BleedingSettings::default() },
         ..blood()
     };
-    (Cuttable { retraction: Retraction { radii: 0.0, length: 0.0 } }, perfusion)
+    (Cuttable { retraction: Retraction { radii: 0.0, length: 0.0 }, ..default() }, perfusion)
 }
 
 fn loss(world: &World, organ: Entity) -> BloodLoss {
@@ -107,7 +108,7 @@ fn the_loss_hardly_depends_on_the_frame_rate() {
     let losses = [30, 60, 240].map(|rate| {
         let mut app = timed_app(Duration::from_secs_f64(1.0 / f64::from(rate)));
         let pulse = RootPressure::Pulsatile(Pulse::default());
-        let organ = grown(&mut app, Perfusion { arterial_pressure: pulse, scale: Scale::CENTIMETRES, ..blood() });
+        let organ = grown(&mut app, Perfusion { arterial_pressure: pulse, scale: Some(Scale::CENTIMETRES), ..blood() });
         app.update();
         cut(&mut app, square(Vec3::Y * 0.2, Vec3::Y, 3.0));
         (1..5 * rate).for_each(|_| app.update());
@@ -202,7 +203,7 @@ fn tissue_below_a_cut_lacks_blood_until_it_is_undone() {
 fn a_bed_with_resistance_joins_arteries_and_veins() {
     let venous_supply = |bed: BedSettings| {
         let mut app = timed_app(FRAME);
-        let organ = grown(&mut app, Perfusion { bed, ..blood() });
+        let organ = grown(&mut app, Perfusion { bed: Some(bed), ..blood() });
         let veins = vessel_entity(app.world(), organ, VesselKind::Vein).unwrap();
         let supply = |world: &World| world.get::<SegmentSupply>(veins).unwrap().segments.first().copied();
         run_until(&mut app, "a supply", |world| supply(world) == Some(1.0));
@@ -289,6 +290,82 @@ fn an_organ_without_perfusion_does_not_bleed_any_more() {
     let ends = open_ends(&mut app);
     assert_eq!(ends.len(), 2, "they are still open");
     assert!(ends.iter().all(|end| end.state == EndState::Dry && end.flow.ml_per_min() == 0.0));
+}
+
+#[test]
+fn whatever_despawns_vessels_they_are_said_to_bleed_no_longer() {
+    for is_organ in [false, true] {
+        let mut app = timed_app(FRAME);
+        let tree = tube(40.0, 0.5, 4);
+        let both = [(VesselKind::Artery, &tree), (VesselKind::Vein, &tree)];
+        let organ = organ_of(&mut app, &both, plain());
+        app.update();
+        cut(&mut app, square(Vec3::X * 25.0, Vec3::X, 2.0));
+        run_until(&mut app, "blood", |world| loss(world, organ).bleeding_ends == 4);
+        let arteries = artery(&app, organ);
+        let mut stopped = MessageCursor::default();
+        drain::<BleedingStopped>(app.world(), &mut stopped);
+        app.world_mut().despawn(if is_organ { organ } else { arteries });
+        let mut told = drain::<BleedingStopped>(app.world(), &mut stopped);
+        app.update();
+        told.extend(drain::<BleedingStopped>(app.world(), &mut stopped));
+        let stopped = told;
+        let of_arteries = stopped.iter().filter(|message| message.vessels == arteries).count();
+        assert_eq!(of_arteries, 2, "{stopped:?}");
+        assert!(stopped.iter().all(|message| message.organ == organ));
+        assert!(!is_organ || stopped.len() == 4, "{stopped:?}");
+        run_until(&mut app, "the veins bleed on", |world| is_organ || loss(world, organ).bleeding_ends == 2);
+    }
+}
+
+#[test]
+fn a_preset_that_knows_its_blood_gives_scale_and_bed_unless_they_are_given() {
+    let own = Scale::METRES;
+    let bare = Some(FlowSettings::arterial().bed);
+    let wishes = [
+        Perfusion::default(),
+        Perfusion { scale: Some(own), ..default() },
+        Perfusion { bed: bare, ..default() },
+        Perfusion { scale: Some(own), bed: bare, ..default() },
+    ];
+    let preset = PresetName::Retina.load();
+    let known = preset.blood.expect("the preset knows its blood");
+    assert_eq!(Vasculature::from_preset(preset).blood, Some(known));
+    // The few vessels of these tests let through little.
+    let known = OrganBlood { flow: Flow::from_ml_per_min(1e-7), ..known };
+    let results = wishes.map(|perfusion| {
+        let mut app = timed_app(FRAME);
+        let organ = spawn(&mut app, Vasculature { blood: Some(known), ..quick() });
+        app.world_mut().entity_mut(organ).insert(perfusion);
+        run_until(&mut app, "a supply", |world| !world.get::<OrganSupply>(organ).unwrap().vertices.is_empty());
+        cut(&mut app, square(0.2 * Vec3::Y, Vec3::Y, 3.0));
+        run_until(&mut app, "a loss", |world| loss(world, organ).bleeding_ends > 0);
+        let extent = app.world().get::<GrowthState>(organ).and_then(GrowthState::tissue).expect("a tissue").extent();
+        let scale = app.world().get::<CirculationState>(organ).and_then(CirculationState::scale).expect("a scale");
+        let fitting = known.scale(extent).expect("a scale");
+        let distal = open_ends(&mut app).into_iter().filter(|end| end.side == EndSide::Distal);
+        (scale == fitting, scale == own, distal.map(|end| end.flow.ml_per_min()).sum::<f64>())
+    });
+    let [both, bed_alone, scale_alone, none] = results;
+    assert_eq!([both, bed_alone, scale_alone, none].map(|(fits, ..)| fits), [true, false, true, false]);
+    assert_eq!([both, bed_alone, scale_alone, none].map(|(_, own, _)| own), [false, true, false, true]);
+    // From the far ends flows what comes back through the bed: without a resistance, far more.
+    assert!(both.2 < 0.5 * scale_alone.2, "{} of {} mL/min", both.2, scale_alone.2);
+    assert!(bed_alone.2 < 0.5 * none.2, "{} of {} mL/min", bed_alone.2, none.2);
+}
+
+#[test]
+fn other_blood_makes_no_other_vessels() {
+    let mut app = timed_app(FRAME);
+    let organ = grown(&mut app, Perfusion::default());
+    let scale = |app: &App| app.world().get::<CirculationState>(organ).and_then(CirculationState::scale);
+    assert_eq!(scale(&app), Some(Perfusion::DEFAULT_SCALE));
+    let mut started = MessageCursor::default();
+    drain::<GrowthStarted>(app.world(), &mut started);
+    app.world_mut().get_mut::<Vasculature>(organ).unwrap().blood = PresetName::Retina.load().blood;
+    (0..2).for_each(|_| app.update());
+    assert_eq!(drain::<GrowthStarted>(app.world(), &mut started), []);
+    assert_ne!(scale(&app), Some(Perfusion::DEFAULT_SCALE), "it is followed at once");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use bevy_vessels::{
     plugin::{
         Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, StrokeId, VesselAction,
         VesselCommand, VesselIndex, VesselOperation, VesselOperationFailed, VesselPicker, VesselSite, VesselWounds,
+        WoundedGrowth,
     },
     synthesis::{
         tree::{NodeId, Place},
@@ -34,7 +35,7 @@ fn to_world(app: &App, organ: Entity, kind: VesselKind) -> Affine3A {
 /// Ends that stay where they are cut. Those that draw back may leave a segment, since vessels on a bent surface have short
 /// ones.
 fn that_stay() -> Cuttable {
-    Cuttable { retraction: Retraction { radii: 0.0, length: 0.0 } }
+    Cuttable { retraction: Retraction { radii: 0.0, length: 0.0 }, ..default() }
 }
 
 /// Segments that cross a plane of the world.
@@ -329,7 +330,7 @@ fn wounds_stay_while_vessels_go_on_growing() {
     let mut app = timed_app(FRAME);
     app.insert_resource(GrowthBudget::Steps(1));
     let organ = spawn(&mut app, quick());
-    app.world_mut().entity_mut(organ).insert(that_stay());
+    app.world_mut().entity_mut(organ).insert(Cuttable { growth: WoundedGrowth::GoesOn, ..that_stay() });
     run_until(&mut app, "half of the steps", |world| progress(world, organ).step == STEPS / 2);
     app.update();
     let (point, normal) = (Vec3::Y * 0.3, Vec3::Y);
@@ -405,6 +406,19 @@ fn organs_that_cannot_be_cut_are_named_and_others_are_cut() {
         vessel_entity(app.world(), bare, VesselKind::Artery)
             .is_some_and(|entity| app.world().get::<VesselIndex>(entity).is_some_and(|index| index.indexed() == 0))
     );
+}
+
+#[test]
+fn a_tree_that_can_be_cut_is_indexed_before_the_first_cut() {
+    for segments in [5, 20_000] {
+        let mut app = timed_app(FRAME);
+        let tree = tube(segments as f32, 0.1, segments);
+        let organ = organ_of(&mut app, &[(VesselKind::Artery, &tree)], Cuttable::default());
+        let entity = vessel_entity(app.world(), organ, VesselKind::Artery).unwrap();
+        run_until(&mut app, "the index", |world| {
+            world.get::<VesselIndex>(entity).unwrap().is_complete(world.get::<Vessels>(entity).unwrap())
+        });
+    }
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! A generator outside the crate that does everything at its start.
 
+use super::errors::failure;
 use super::*;
 use bevy_vessels::{
-    plugin::{EntityCommandsExt, GrowthFinished, OrganPaint},
+    plugin::{EntityCommandsExt, GrowthFinished, OrganGrowthError, OrganPaint},
     synthesis::{
         generator::{CustomGenerator, Generator, GrowthMaker},
         growth::{GrownTree, Growth, StepCount, TreeUpdate},
@@ -51,6 +52,70 @@ impl Growth for Made {
 
     fn update(&self, _: VesselKind) -> TreeUpdate<'_> {
         TreeUpdate::Grown { changed: &[] }
+    }
+}
+
+/// Starts growths that panic: at their start with seed 0, else in a step.
+#[derive(Debug)]
+struct Bomb;
+
+impl GrowthMaker for Bomb {
+    fn root_spacing(&self, _: f32) -> ByKind<Option<RootSpacing>> {
+        ByKind::default()
+    }
+
+    fn start(&self, _: Arc<dyn Tissue>, _: &Roots, _: f32, seed: u64) -> Result<Box<dyn Growth>, String> {
+        assert!(seed != 0, "no start with seed {seed}");
+        Ok(Box::new(Ticking(Made(VesselTree::new()))))
+    }
+}
+
+#[derive(Debug)]
+struct Ticking(Made);
+
+impl Growth for Ticking {
+    fn advance(&mut self) {
+        panic!("no step {}", 1);
+    }
+
+    fn settle(&mut self) {}
+
+    fn is_finished(&self) -> bool {
+        false
+    }
+
+    fn progress(&self) -> StepCount {
+        StepCount { done: 0, all: 2 }
+    }
+
+    fn trees(&self) -> ByKind<Option<GrownTree<'_>>> {
+        self.0.trees()
+    }
+
+    fn update(&self, kind: VesselKind) -> TreeUpdate<'_> {
+        self.0.update(kind)
+    }
+}
+
+#[test]
+fn a_generator_that_panics_fails_its_organ_alone() {
+    for (seed, told) in [(0, "no start with seed 0"), (1, "no step 1")] {
+        let mut app = headless(GrowthBudget::Steps(4));
+        let healthy = spawn(&mut app, quick());
+        let bomb =
+            |seed| Vasculature::default().with_generator(Generator::Custom(CustomGenerator::new(Bomb))).with_seed(seed);
+        let organ = spawn(&mut app, bomb(seed));
+        let error = failure(&mut app, organ).error;
+        assert!(matches!(&error, OrganGrowthError::Panicked(_)) && error.to_string().contains(told), "{error}");
+        run_to_phase(&mut app, healthy, GrowthPhase::Finished);
+        send(&mut app, organ, GrowthAction::Restart);
+        assert_eq!(failure(&mut app, organ).error, error, "it tries again");
+        let now = spawn(&mut app, bomb(seed));
+        app.world_mut().commands().entity(now).grow_now();
+        assert_eq!(failure(&mut app, now).error, error, "whoever asks");
+        *app.world_mut().get_mut::<Vasculature>(organ).expect("an organ has wishes") = quick();
+        run_to_phase(&mut app, organ, GrowthPhase::Finished);
+        assert_eq!(trees(app.world(), organ), trees(app.world(), healthy));
     }
 }
 

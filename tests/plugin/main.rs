@@ -14,6 +14,7 @@ mod entities;
 mod errors;
 mod generators;
 mod growth;
+mod held;
 mod observers;
 mod operating_field;
 mod optimised;
@@ -22,12 +23,17 @@ mod picking;
 mod presets;
 mod registry;
 mod scene;
+mod scene_organs;
 #[path = "../common/shared.rs"]
 mod shared;
+mod sharing;
 mod sources;
 mod splitting;
+mod starting;
 mod surface;
+mod undo_limit;
 mod units;
+mod warnings;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};
 use bevy_vessels::{

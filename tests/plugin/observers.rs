@@ -87,7 +87,7 @@ fn a_failure_is_heard_on_its_organ_only() {
 fn cuts_and_bleeding_are_heard_with_their_open_ends_in_place() {
     let mut app = headless(GrowthBudget::default());
     let bleeding = BleedingSettings { clotting: None, ..default() };
-    let perfusion = Perfusion { scale: Scale::CENTIMETRES, bleeding, ..default() };
+    let perfusion = Perfusion { scale: Some(Scale::CENTIMETRES), bleeding, ..default() };
     let organ = spawn(&mut app, quick());
     app.world_mut().entity_mut(organ).insert((Cuttable::default(), perfusion));
     listen::<VesselOperation>(&mut app, organ);

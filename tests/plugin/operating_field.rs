@@ -44,7 +44,7 @@ pub fn fork(radius: f32) -> VesselTree {
 
 /// Blood in an organ whose unit is a millimetre.
 pub fn blood() -> Perfusion {
-    Perfusion { scale: Scale::MILLIMETRES, ..Perfusion::default() }
+    Perfusion { scale: Some(Scale::MILLIMETRES), ..Perfusion::default() }
 }
 
 /// A square blade with an edge length, perpendicular to a direction.

@@ -8,7 +8,7 @@ use bevy::{
 use bevy_vessels::{
     plugin::{
         BloodLoss, CirculationState, Cuttable, CuttableVessels, GrowthControl, OpenEnd, OpenEndEntities, Patient,
-        Perfusion, VesselOperation, VesselWounds, VesselsOf,
+        Perfusion, VesselOperation, VesselWounds, VesselsOf, WoundedGrowth,
     },
     synthesis::{
         haemodynamics::{BleedingSettings, BloodVolumeSettings, EndState},
@@ -22,7 +22,7 @@ use serde::de::DeserializeSeed;
 /// An organ that never stops bleeding once it is cut.
 fn organ_with_blood(app: &mut App, vasculature: Vasculature) -> Entity {
     let bleeding = BleedingSettings { clotting: None, ..default() };
-    let perfusion = Perfusion { scale: Scale::CENTIMETRES, bleeding, ..default() };
+    let perfusion = Perfusion { scale: Some(Scale::CENTIMETRES), bleeding, ..default() };
     let blood = BloodVolumeSettings { total: Volume::from_ml(321.0), ..default() };
     let patient = Patient::new(blood).expect("settings within their limits");
     let organ = spawn(app, vasculature);
@@ -224,6 +224,7 @@ fn a_growth_that_was_paused_is_as_far_as_it_was() {
     let organ = organ_with_blood(&mut app, quick());
     run_until(&mut app, "some steps", |world| progress(world, organ).step == 12);
     send(&mut app, organ, GrowthAction::Pause);
+    app.world_mut().entity_mut(organ).insert(Cuttable { growth: WoundedGrowth::GoesOn, ..default() });
     app.update();
     operate(&mut app, organ);
     let (before, step) = (condition(app.world(), organ), progress(app.world(), organ).step);
@@ -237,6 +238,23 @@ fn a_growth_that_was_paused_is_as_far_as_it_was() {
     send(&mut fresh, loaded, GrowthAction::Finish);
     run_to_phase(&mut fresh, loaded, GrowthPhase::Finished);
     assert!(!condition(fresh.world(), loaded).injured.is_empty(), "wounds stay while the growth goes on");
+}
+
+/// No frame may grow on before the wounds are back.
+#[test]
+fn a_growth_that_was_held_by_wounds_is_held_again() {
+    let mut app = headless(GrowthBudget::Steps(1));
+    let organ = organ_with_blood(&mut app, quick());
+    run_until(&mut app, "some steps", |world| progress(world, organ).step == 12);
+    operate(&mut app, organ);
+    let before = condition(app.world(), organ);
+    let scene = save(app.world_mut());
+    let mut fresh = headless(GrowthBudget::Steps(100));
+    let [loaded] = load(&mut fresh, &scene)[..] else { panic!("one organ") };
+    wait_for_vessels(&mut fresh, loaded, before.trees[0].1.len());
+    (0..5).for_each(|_| fresh.update());
+    assert_eq!(condition(fresh.world(), loaded), before);
+    assert_eq!(progress(fresh.world(), loaded).phase, GrowthPhase::Held);
 }
 
 #[test]
@@ -278,7 +296,7 @@ fn given_organ(app: &mut App) -> (Entity, Entity) {
     let positions = vec![Vec3::ZERO, 0.3 * Vec3::Y, Vec3::new(0.2, 0.6, 0.0), Vec3::new(-0.2, 0.6, 0.0)];
     let tree = VesselTree::from_arrays(positions, vec![NO_PARENT, 0, 1, 1], vec![0.05, 0.05, 0.04, 0.04]);
     let vessels = Vessels::from_tree(VesselKind::Artery, &tree.expect("a tree"), &[0, 1, 2, 2]);
-    let perfusion = Perfusion { scale: Scale::CENTIMETRES, ..default() };
+    let perfusion = Perfusion { scale: Some(Scale::CENTIMETRES), ..default() };
     let organ = app.world_mut().spawn((Transform::default(), Visibility::default(), perfusion)).id();
     let entity = app.world_mut().spawn((vessels, VesselsOf(organ), ChildOf(organ))).id();
     (organ, entity)

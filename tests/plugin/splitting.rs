@@ -7,7 +7,7 @@ use bevy::ecs::system::RunSystemOnce;
 use bevy_vessels::{
     plugin::{
         BloodLoss, Cuttable, CuttableVessels, FollowsMesh, GrowthControl, OpenEnd, VesselPicker, VesselPlace,
-        VesselWounds,
+        VesselWounds, WoundedGrowth,
     },
     synthesis::{
         generator::{CustomGenerator, Generator, GrowthMaker},
@@ -121,7 +121,8 @@ fn paused(app: &mut App, components: impl Bundle) -> Entity {
     };
     let splitter = Generator::Custom(CustomGenerator::new(Splitter));
     let organ = spawn(app, Vasculature::default().with_generator(splitter).with_roots(roots));
-    app.world_mut().entity_mut(organ).insert((GrowthControl::Paused, Cuttable::default(), components));
+    let goes_on = Cuttable { growth: WoundedGrowth::GoesOn, ..default() };
+    app.world_mut().entity_mut(organ).insert((GrowthControl::Paused, goes_on, components));
     run_to_phase(app, organ, GrowthPhase::Growing);
     (0..2).for_each(|_| app.update());
     organ

@@ -17,7 +17,7 @@ const FRAMES: u32 = 30;
 const UNITS: [f64; 3] = [1.0, 1e3, 50.0 / (2.0 * SIZE)];
 
 fn blood_in(units: f64) -> Perfusion {
-    Perfusion { scale: Scale::from_metres(1.0 / units).expect("a scale"), ..Perfusion::default() }
+    Perfusion { scale: Some(Scale::from_metres(1.0 / units).expect("a scale")), ..Perfusion::default() }
 }
 
 /// Cuts an organ through the middle, and returns its loss a while later.

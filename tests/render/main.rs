@@ -12,6 +12,7 @@ mod detail;
 mod flight;
 mod stage;
 mod surfaces;
+mod taken_over;
 mod wounds;
 
 use bevy::{

@@ -150,6 +150,44 @@ fn reports_add_up_and_undo_leads_back() {
     }
 }
 
+/// What was done before stays, whatever is undone, and everything after it can be undone as before.
+#[test]
+fn permanent_actions_stay_and_later_ones_can_be_undone() {
+    for seed in 0..3 {
+        let mut rng = rng(61 + seed);
+        let tree = forest(seed, 300);
+        let mut wounds = Wounds::new(Retraction { radii: 1.5, length: 0.0 }).unwrap();
+        let mut heard = Heard::default();
+        let mut states = vec![state(&wounds, &tree)];
+        for _ in 0..200 {
+            if let Some(report) = act(&mut rng, &mut wounds, &tree, &heard) {
+                heard.hear(&report);
+                if !report.is_empty() {
+                    states.push(state(&wounds, &tree));
+                }
+            }
+            if rng.random_range(0..8) == 0 {
+                let permanent = rng.random_range(0..5).min(wounds.actions());
+                wounds.make_permanent(permanent);
+                states.drain(..permanent);
+            }
+            assert_eq!(wounds.actions() + 1, states.len());
+            assert_eq!(state(&wounds, &tree), states[states.len() - 1], "what is permanent looks the same");
+            if rng.random_range(0..10) == 0 {
+                let actions = rng.random_range(1..9);
+                heard.hear(&wounds.undo_last(actions, &tree));
+                states.truncate(states.len().saturating_sub(actions).max(1));
+                assert_eq!(state(&wounds, &tree), states[states.len() - 1], "seed {seed}");
+            }
+        }
+        heard.hear(&wounds.undo_last(usize::MAX, &tree));
+        assert_eq!(state(&wounds, &tree), states[0], "the permanent ones are left");
+        assert!(!wounds.is_empty() && wounds.are_lasting());
+        heard.hear(&wounds.undo_all(&tree));
+        assert!(wounds.is_empty() && heard == Heard::default(), "all heals");
+    }
+}
+
 #[test]
 fn thousands_of_cuts_into_one_vessel_leave_one_more_piece_each() {
     let tree = crate::common::straight(1);

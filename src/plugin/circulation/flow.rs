@@ -20,11 +20,12 @@ use crate::plugin::{
     surgery::open_ends::{OpenEnd, OpenEndEntities},
     vessels::{
         relations::{OrganVessels, VesselsOf},
+        tree::Vessels,
         wounds::VesselWounds,
     },
 };
 use crate::synthesis::{
-    haemodynamics::{Bleeding, EndState, FlowError},
+    haemodynamics::{Bleeding, EndState, FlowError, FlowSettings},
     pace::Pace,
     tree::{BedLink, ByKind},
 };
@@ -38,6 +39,9 @@ use bevy::ecs::{
     system::{Commands, Query},
     world::EntityWorldMut,
 };
+
+/// Times that a network is solved to fit its bed.
+const FITTING: usize = 40;
 
 /// Gives a patient to organs that find none, and the written components to their vessels.
 pub(crate) fn prepare_organs(
@@ -78,7 +82,7 @@ pub(crate) fn make_flow(
 
 impl PerfusedOrganItem<'_, '_> {
     fn vessels_now(&self, vessels: &Query<Perfused>) -> MadeFor {
-        let is_grown = self.progress.is_none_or(GrowthProgress::is_finished);
+        let is_grown = self.progress.is_none_or(GrowthProgress::is_settled);
         let mut made_for = MadeFor { lineages: ByKind::default(), nodes: ByKind::default(), is_grown };
         for found in each_kind(self.entities(), vessels) {
             let kind = found.vessels.kind();
@@ -90,13 +94,22 @@ impl PerfusedOrganItem<'_, '_> {
 
     /// Whether a new flow has to be made.
     fn takes_note_of(&mut self, made_for: MadeFor) -> bool {
-        let mut is_new = self.state.made_for != Some(made_for);
-        if self.perfusion.is_changed() {
-            let made_with = Some((self.perfusion.hydraulics(), self.perfusion.bleeding));
-            is_new |= self.state.made_with != made_with;
+        let is_new = self.state.made_for != Some(made_for);
+        let blood = self.wish.and_then(|wish| wish.blood);
+        if !is_new && !self.perfusion.is_changed() && blood == self.state.blood {
+            return false;
+        }
+        self.state.blood = blood;
+        let extent = self.growth.and_then(GrowthState::tissue).map(|tissue| tissue.extent());
+        let mut hydraulics = self.perfusion.hydraulics(blood, extent);
+        // What an organ takes once it has grown is too much for its first vessels.
+        hydraulics.flow = hydraulics.flow.filter(|_| made_for.is_grown);
+        let made_with = Some((hydraulics, self.perfusion.bleeding));
+        let is_otherwise = self.state.made_with != made_with;
+        if is_otherwise {
             self.state.made_with = made_with;
         }
-        is_new
+        is_new || is_otherwise
     }
 
     /// Starts making a flow. Large trees wait until they have grown.
@@ -116,13 +129,18 @@ impl PerfusedOrganItem<'_, '_> {
         if !(made_for.is_grown || jobs.is_small(nodes)) {
             return;
         }
-        let (trees, hydraulics) = (self.trees(vessels), self.perfusion.hydraulics());
+        let trees = self.trees(vessels);
+        let hydraulics = self.state.made_with.as_ref().map(|(hydraulics, _)| hydraulics.clone()).unwrap_or_default();
+        let has_resistance = |settings: &FlowSettings| settings.bed.resistance.is_some();
+        let is_joined = hydraulics.flow.is_some() || hydraulics.settings.artery.as_ref().is_some_and(has_resistance);
         let links: Vec<BedLink> = match self.growth.and_then(GrowthState::growth) {
-            Some(growth) if self.perfusion.bed.resistance.is_some() => growth.bed_links().to_vec(),
+            Some(growth) if is_joined => growth.bed_links().to_vec(),
             _ => Vec::new(),
         };
+        // A bed that is fitted takes some tens of solutions.
+        let work = if hydraulics.flow.is_some() { nodes.saturating_mul(FITTING) } else { nodes };
         let make = async move |pace: Pace| OrganFlow::new(trees, &hydraulics, &links, &pace).await;
-        self.state.job = Some(jobs.start(nodes, make));
+        self.state.job = Some(jobs.start(work, make));
     }
 
     /// Copies of the trees at rest.
@@ -181,6 +199,28 @@ impl PerfusedOrganItem<'_, '_> {
             self.fail(error, failed);
         }
     }
+}
+
+/// Tells that the ends of vessels stop bleeding which are despawned, or removed from their entity.
+pub(crate) fn stop_bleeding(
+    removed: On<Remove, Vessels>,
+    vessels: Query<(&Vessels, &VesselsOf)>,
+    mut organs: Query<&mut CirculationState>,
+    mut stopped: Announcer<BleedingStopped>,
+) {
+    let Ok((vessels, of)) = vessels.get(removed.entity) else { return };
+    let Ok(mut state) = organs.get_mut(of.0) else { return };
+    let kind = vessels.kind();
+    // Another entity of this kind may have the blood.
+    if state.made_for.is_none_or(|made_for| made_for.lineages[kind] != vessels.lineage()) {
+        return;
+    }
+    let ends = std::mem::take(&mut state.ends[kind]);
+    for (_, end) in state.bleeding[kind].ends().iter().zip(ends).filter(|(end, _)| end.state == EndState::Bleeding) {
+        let (organ, vessels) = (of.0, removed.entity);
+        stopped.announce(BleedingStopped { organ, vessels, end: end.id, side: end.side, entity: None });
+    }
+    state.bleeding[kind] = Bleeding::new(*state.bleeding[kind].settings()).unwrap_or_default();
 }
 
 /// Removes the flow of an organ that lost its [`Perfusion`].

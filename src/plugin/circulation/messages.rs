@@ -34,9 +34,8 @@ pub struct BleedingStarted {
     pub entity: Entity,
 }
 
-/// An open end stops bleeding: it has clotted, has no pressure left, was closed, or its organ lost its
-/// [`Perfusion`](crate::plugin::Perfusion). Also an event on the organ, for
-/// observers.
+/// An open end stops bleeding: it has clotted, has no pressure left, was closed, its vessels are gone, or its organ
+/// lost its [`Perfusion`](crate::plugin::Perfusion). Also an event on the organ, for observers.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Message, Event, Clone, PartialEq)]
 pub struct BleedingStopped {
@@ -49,7 +48,7 @@ pub struct BleedingStopped {
     pub end: EndId,
     /// The end's side of the cut.
     pub side: EndSide,
-    /// Its [`OpenEnd`](crate::plugin::OpenEnd) entity, `None` if it was closed.
+    /// Its [`OpenEnd`](crate::plugin::OpenEnd) entity, `None` if it was closed or is gone.
     pub entity: Option<Entity>,
 }
 

@@ -63,6 +63,7 @@ impl Plugin for CirculationPlugin {
             .add_message::<BleedingStopped>()
             .add_message::<CirculationFailed>()
             .add_observer(flow::remove_circulation)
+            .add_observer(flow::stop_bleeding)
             .add_observer(flow::lay_again);
         let circulate = (
             flow::prepare_organs,

@@ -10,7 +10,7 @@ use crate::synthesis::{
     },
     pace::Pace,
     tree::{BedLink, ByKind, NodeId, VesselKind, VesselTree},
-    units::Pressure,
+    units::{Flow, Pressure, Resistance},
     wound::{Blockage, EndId, EndSide, Wounds},
 };
 use bevy::math::Vec3;
@@ -19,8 +19,21 @@ use std::sync::Arc;
 /// The trees of an organ; `None` for a kind without vessels.
 pub(crate) type Trees = ByKind<Option<VesselTree>>;
 
-/// Settings of the flow in each kind of vessels; `None` for a kind that carries no blood.
-pub(crate) type Hydraulics = ByKind<Option<FlowSettings>>;
+/// What determines the flow in an organ, besides its vessels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Hydraulics {
+    /// Settings of each kind of vessels; `None` for a kind that carries no blood.
+    pub(crate) settings: ByKind<Option<FlowSettings>>,
+    /// The flow into the arteries that the bed is to let through; `None` if the bed is as the settings say.
+    pub(crate) flow: Option<Flow>,
+}
+
+/// Gives the bed between arteries and veins a resistance.
+fn give_bed(settings: &mut ByKind<Option<FlowSettings>>, resistance: Option<Resistance>) {
+    for settings in [&mut settings.artery, &mut settings.vein].into_iter().flatten() {
+        settings.bed.resistance = resistance;
+    }
+}
 
 /// An open end in the flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +54,33 @@ struct Networks {
 
 impl Networks {
     async fn new(trees: &Trees, hydraulics: &Hydraulics, links: &[BedLink], pace: &Pace) -> Result<Self, FlowError> {
+        let mut settings = hydraulics.settings.clone();
+        let Some(flow) = hydraulics.flow else { return Self::of_bed(trees, &settings, links, pace).await };
+        // A joined bed needs a resistance to begin with; this one is replaced.
+        give_bed(&mut settings, Some(Resistance::from_pascal_seconds_per_cubic_metre(1.0)));
+        let mut networks = Self::of_bed(trees, &settings, links, &pace.part(0.0..0.3)).await?;
+        let fitted = networks.fit_bed(flow, &pace.part(0.3..0.7)).await;
+        match (&networks.joined, fitted) {
+            (Some(_), Ok(_)) => Ok(networks),
+            // Trees that nothing joins each have a bed of their own: that of the arteries serves all.
+            (None, Ok(resistance)) => {
+                give_bed(&mut settings, resistance);
+                Self::of_bed(trees, &settings, &[], &pace.part(0.7..1.0)).await
+            }
+            (_, Err(_)) => Self::of_bed(trees, &hydraulics.settings, &[], &pace.part(0.7..1.0)).await,
+        }
+    }
+
+    /// The networks for a bed as the settings say.
+    async fn of_bed(
+        trees: &Trees,
+        settings: &ByKind<Option<FlowSettings>>,
+        links: &[BedLink],
+        pace: &Pace,
+    ) -> Result<Self, FlowError> {
         let mut networks = Self::default();
         for (kind, pace) in each_kind(&pace.part(0.0..0.8)) {
-            if let Some((tree, settings)) = trees[kind].as_ref().zip(hydraulics[kind].clone()) {
+            if let Some((tree, settings)) = trees[kind].as_ref().zip(settings[kind].clone()) {
                 networks.apart[kind] = Some(Network::new_paced(tree, settings, &pace).await?);
             }
         }
@@ -51,6 +88,15 @@ impl Networks {
             networks.join(links, &pace.part(0.8..1.0)).await?;
         }
         Ok(networks)
+    }
+
+    /// Gives the bed the resistance at which a flow enters the arteries; `None` if there are none.
+    async fn fit_bed(&mut self, flow: Flow, pace: &Pace) -> Result<Option<Resistance>, FlowError> {
+        match (&mut self.joined, &mut self.apart.artery) {
+            (Some(joined), _) => joined.fit_bed_paced(flow, pace).await.map(Some),
+            (None, Some(arteries)) => arteries.fit_bed_paced(flow, pace).await.map(Some),
+            (None, None) => Ok(None),
+        }
     }
 
     /// Joins arteries and veins through the bed, if there are both.
@@ -308,5 +354,47 @@ fn interruption(blockage: &Blockage, radius: f32, laid: Option<Interruption>) ->
             Interruption { proximal: keep(new.proximal, laid.proximal), distal: keep(new.distal, laid.distal), ..new }
         }
         _ => new,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesis::{pace::at_once, tree::NO_PARENT};
+
+    /// A stem that forks.
+    fn fork() -> VesselTree {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -1.0, 0.0)];
+        VesselTree::from_arrays(positions, vec![NO_PARENT, 0, 1, 1], vec![0.05; 4]).expect("a tree")
+    }
+
+    fn flow_for(flow: Option<Flow>, links: &[BedLink]) -> OrganFlow {
+        let settings =
+            ByKind { artery: Some(FlowSettings::arterial()), vein: Some(FlowSettings::venous()), ..ByKind::default() };
+        let trees = ByKind { artery: Some(fork()), vein: Some(fork()), ..Trees::default() };
+        let hydraulics = Hydraulics { settings, flow };
+        at_once(OrganFlow::new(trees, &hydraulics, links, &Pace::default())).expect("a flow")
+    }
+
+    /// Flow into the arteries of the intact organ, in mL/min.
+    fn inflow(flow: &mut OrganFlow) -> f64 {
+        at_once(flow.networks.solve(&Pace::default())).expect("it converges");
+        flow.networks.get(VesselKind::Artery).expect("there are arteries").inflow().ml_per_min()
+    }
+
+    #[test]
+    fn the_bed_lets_through_the_known_flow_apart_and_joined() {
+        let links = [2, 3].map(|node| BedLink { arterial: NodeId(node), venous: NodeId(node) });
+        let free = inflow(&mut flow_for(None, &[]));
+        for links in [&[][..], &links] {
+            let known = Flow::from_ml_per_min(1e-3 * free);
+            let mut flow = flow_for(Some(known), links);
+            assert_eq!(flow.networks.joined.is_some(), !links.is_empty());
+            assert!((inflow(&mut flow) / known.ml_per_min() - 1.0).abs() < 1e-6);
+            let bed = |kind| flow.networks.get(kind).map(|network| network.settings().bed.resistance.is_some());
+            assert_eq!([VesselKind::Artery, VesselKind::Vein].map(bed), [Some(true); 2], "on both sides");
+        }
+        let mut narrow = flow_for(Some(Flow::from_ml_per_min(10.0 * free)), &links);
+        assert!((inflow(&mut narrow) / free - 1.0).abs() < 1e-9, "vessels that let through less limit alone");
     }
 }

@@ -7,7 +7,7 @@ use crate::plugin::{
         perfusion::{BloodLoss, Perfusion},
         state::CirculationState,
     },
-    growth::{progress::GrowthProgress, state::GrowthState},
+    growth::{progress::GrowthProgress, state::GrowthState, vasculature::Vasculature},
     surgery::open_ends::OpenEndEntities,
     vessels::{relations::OrganVessels, tree::Vessels, wounds::VesselWounds},
 };
@@ -33,6 +33,7 @@ pub(crate) struct PerfusedOrgan {
     pub(crate) entity: Entity,
     pub(crate) perfusion: Ref<'static, Perfusion>,
     pub(crate) vessels: Option<&'static OrganVessels>,
+    pub(crate) wish: Option<&'static Vasculature>,
     pub(crate) growth: Option<&'static GrowthState>,
     pub(crate) progress: Option<&'static GrowthProgress>,
     pub(crate) state: &'static mut CirculationState,

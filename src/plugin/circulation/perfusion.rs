@@ -6,6 +6,8 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     haemodynamics::{BedSettings, BleedingSettings, FlowSettings, RootPressure, ViscosityLaw},
+    preset::OrganBlood,
+    tissue::Extent,
     tree::{ByKind, VesselKind},
     units::{Flow, Pressure, Scale, Volume},
 };
@@ -23,10 +25,11 @@ use bevy::{
 ///
 /// Flow is that of the organ at rest: neither its transform nor its deformation changes it.
 ///
-/// By default the vessels alone limit the flow, and let through many times what an organ takes: litres a minute in a
-/// colon. For a physiological flow, give the bed a resistance. A preset that knows its organ's
-/// [blood](crate::synthesis::preset::Preset::blood) gives the scale and the flow, and
-/// [`fit_bed`](crate::synthesis::haemodynamics::Network::fit_bed) the resistance for it.
+/// Vessels alone let through many times what an organ takes: litres a minute in a colon. Presets that know their
+/// organ's blood, in [`Vasculature::blood`](crate::plugin::Vasculature::blood), give a physiological flow: unless
+/// [`scale`](Self::scale) and [`bed`](Self::bed) are given, the organ has the size of such an organ, and its bed the
+/// resistance at which it takes that flow once its vessels have grown. Without such a preset, give the bed a
+/// resistance.
 ///
 /// Time is that of Bevy's generic clock. Its virtual time counts at most a quarter of a second of a frame, unless an app
 /// sets another `max_delta` of [`Time<Virtual>`](bevy::time::Virtual): in longer frames blood loses time, as all does that
@@ -36,7 +39,7 @@ use bevy::{
 /// # use bevy_vessels::{plugin::{Perfusion, Vasculature}, synthesis::{preset::PresetName, units::Scale}};
 /// let organ = (
 ///     Vasculature::new(PresetName::Colon),
-///     Perfusion { scale: Scale::MILLIMETRES, ..Perfusion::default() },
+///     Perfusion { scale: Some(Scale::MILLIMETRES), ..Perfusion::default() },
 /// );
 /// ```
 #[derive(Component, Clone, Debug, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
@@ -46,8 +49,11 @@ use bevy::{
 pub struct Perfusion {
     /// Length of a unit of the organ's mesh. Flow rises with its cube, so a wrong scale is easily seen.
     ///
-    /// The scale of the organ's transform doesn't count. Default: [`Scale::METRES`], as in glTF files and Bevy's worlds.
-    pub scale: Scale,
+    /// The scale of the organ's transform doesn't count.
+    ///
+    /// Default: `None`, for the one at which the organ has the size that its preset knows. Where it knows none:
+    /// [`Self::DEFAULT_SCALE`], as in glTF files and Bevy's worlds.
+    pub scale: Option<Scale>,
     /// How viscosity depends on vessel diameter. Default: [`ViscosityLaw::IN_VIVO`].
     pub viscosity: ViscosityLaw,
     /// Pressure at the arteries' roots; a [`Pulse`](crate::synthesis::haemodynamics::Pulse) makes open ends spurt.
@@ -69,8 +75,10 @@ pub struct Perfusion {
     /// trees. Without a resistance, each side ends in the bed on its own, and the cost of a frame depends only on the
     /// number of open ends.
     ///
-    /// Default: without a resistance.
-    pub bed: BedSettings,
+    /// Default: `None`, for the resistance at which the flow that the preset knows enters the organ; if the vessels
+    /// don't let through that much, or it knows none, without a resistance, at the pressure of
+    /// [`FlowSettings::arterial`].
+    pub bed: Option<BedSettings>,
     /// Pressure outside the vessels. Default: atmospheric, 0.
     pub ambient: Pressure,
     /// Discharge coefficient of open ends. Limits: > 0, at most 1. Default:
@@ -90,26 +98,33 @@ pub struct Perfusion {
 }
 
 impl Perfusion {
+    /// Scale of an organ of which none is known.
+    pub const DEFAULT_SCALE: Scale = Scale::METRES;
     /// Default of [`ischaemic_below`](Self::ischaemic_below): half the supply of the intact organ.
     pub const DEFAULT_ISCHAEMIC_BELOW: f32 = 0.5;
     /// Default of [`supply_interval`](Self::supply_interval), in seconds.
     pub const DEFAULT_SUPPLY_INTERVAL: f32 = 0.5;
 
-    /// The flow settings of a kind of vessels; `None` for those that carry no blood.
+    /// The flow settings of a kind of vessels, without what a preset knows; `None` for those that carry no blood.
     pub fn flow_settings(&self, kind: VesselKind) -> Option<FlowSettings> {
+        let scale = self.scale.unwrap_or(Self::DEFAULT_SCALE);
+        let bed = self.bed.unwrap_or_else(|| FlowSettings::arterial().bed);
         let (root, bed) = match kind {
-            VesselKind::Artery => (self.arterial_pressure, self.bed),
-            VesselKind::Vein => (self.venous_pressure, self.bed),
+            VesselKind::Artery => (self.arterial_pressure, bed),
+            VesselKind::Vein => (self.venous_pressure, bed),
             VesselKind::PortalVein => (self.portal_pressure, self.portal_bed),
             VesselKind::Duct => return None,
         };
-        let Self { scale, viscosity, ambient, discharge_coefficient, .. } = *self;
+        let Self { viscosity, ambient, discharge_coefficient, .. } = *self;
         Some(FlowSettings { scale, viscosity, root, bed, ambient, discharge_coefficient })
     }
 
-    /// The same for all kinds.
-    pub(crate) fn hydraulics(&self) -> Hydraulics {
-        ByKind::from_fn(|kind| self.flow_settings(kind))
+    /// The same for all kinds, in an organ of this extent with this blood.
+    pub(crate) fn hydraulics(&self, blood: Option<OrganBlood>, extent: Option<Extent>) -> Hydraulics {
+        let scale = || blood?.scale(extent?).ok();
+        let scaled = Self { scale: self.scale.or_else(scale), ..self.clone() };
+        let flow = if self.bed.is_none() { blood.map(|blood| blood.flow) } else { None };
+        Hydraulics { settings: ByKind::from_fn(|kind| scaled.flow_settings(kind)), flow }
     }
 }
 
@@ -117,13 +132,13 @@ impl Default for Perfusion {
     fn default() -> Self {
         let (arterial, venous, portal) = (FlowSettings::arterial(), FlowSettings::venous(), FlowSettings::portal());
         Self {
-            scale: Scale::METRES,
+            scale: None,
             viscosity: arterial.viscosity,
             arterial_pressure: arterial.root,
             venous_pressure: venous.root,
             portal_pressure: portal.root,
             portal_bed: portal.bed,
-            bed: arterial.bed,
+            bed: None,
             ambient: arterial.ambient,
             discharge_coefficient: arterial.discharge_coefficient,
             bleeding: BleedingSettings::default(),

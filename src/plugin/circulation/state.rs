@@ -11,7 +11,9 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     haemodynamics::{Bleeding, BleedingSettings, FlowError},
+    preset::OrganBlood,
     tree::{ByKind, VesselKind},
+    units::Scale,
 };
 use bevy::{
     ecs::{component::Component, reflect::ReflectComponent},
@@ -29,6 +31,9 @@ pub struct CirculationState {
     /// The vessels of the present or coming flow.
     #[serde(skip)]
     pub(super) made_for: Option<MadeFor>,
+    /// What the organ's preset knows of its blood.
+    #[serde(skip)]
+    pub(super) blood: Option<OrganBlood>,
     /// The settings of this flow.
     #[serde(skip)]
     pub(super) made_with: Option<(Hydraulics, BleedingSettings)>,
@@ -81,6 +86,13 @@ impl CirculationState {
     /// The bleeding of each open end of a kind of vessels, as of the last frame.
     pub fn bleeding(&self, kind: VesselKind) -> &Bleeding {
         &self.bleeding[kind]
+    }
+
+    /// Length of a unit of the organ's mesh for its blood: the one that is given, or that of the preset; `None` before
+    /// the first flow.
+    pub fn scale(&self) -> Option<Scale> {
+        let (hydraulics, _) = self.made_with.as_ref()?;
+        hydraulics.settings.artery.as_ref().map(|settings| settings.scale)
     }
 
     /// Why no blood flows, if something is wrong.

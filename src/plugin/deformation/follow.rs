@@ -209,7 +209,7 @@ pub(crate) fn follow_meshes(
         let motion = Motion {
             rest: RestOrgan::Surface(copy),
             lineage: organ.rest.tissue,
-            is_grown: organ.progress.is_none_or(GrowthProgress::is_finished),
+            is_grown: organ.progress.is_none_or(GrowthProgress::is_settled),
             has_moved,
             vertices: if is_at_rest { None } else { Some(&organ.rest.followed) },
         };
@@ -238,7 +238,7 @@ pub(crate) fn follow_tetrahedra(mut organs: Query<FollowedTetrahedra>, mut bound
         let motion = Motion {
             rest: RestOrgan::Solid(Arc::clone(&tetrahedra.rest)),
             lineage: tetrahedra.lineage,
-            is_grown: organ.progress.is_none_or(GrowthProgress::is_finished),
+            is_grown: organ.progress.is_none_or(GrowthProgress::is_settled),
             has_moved: tetrahedra.is_changed(),
             vertices: if is_at_rest { None } else { Some(&tetrahedra.positions) },
         };

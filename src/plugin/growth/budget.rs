@@ -57,7 +57,8 @@ impl Default for GrowthBudget {
 pub struct GrowthFrame {
     /// Steps, over all organs.
     pub steps: u32,
-    /// Time for starting growths: copying meshes and planting roots. Tissues are prepared in jobs, outside this time.
+    /// Time for starting growths: copying meshes, and starts that take no time. Jobs prepare tissues and place roots,
+    /// outside this time.
     pub start_time: Duration,
     /// Time for the steps, and for the radii that result from them.
     pub step_time: Duration,

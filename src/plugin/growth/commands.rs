@@ -56,7 +56,12 @@ fn grow_organ_now(world: &mut World, organ: Entity) -> Result<(), RegisteredSyst
 }
 
 /// Prepares an organ synchronously, and does all its steps.
-fn finish_organ(In(entity): In<Entity>, assets: OrganAssets, mut organs: Query<Organ>, mut messages: StartMessages) {
+fn finish_organ(
+    In(entity): In<Entity>,
+    mut assets: OrganAssets,
+    mut organs: Query<Organ>,
+    mut messages: StartMessages,
+) {
     let Ok(mut organ) = organs.get_mut(entity) else {
         warn!("{entity}: grow_now needs an entity with a Vasculature");
         return;
@@ -64,8 +69,13 @@ fn finish_organ(In(entity): In<Entity>, assets: OrganAssets, mut organs: Query<O
     organ.follow();
     organ.state.request_finish();
     if organ.state.need != Need::Nothing {
-        let outcome = organ.begin(&assets, None);
+        let outcome = organ.begin(&mut assets, None);
         organ.report(outcome, &mut messages);
+    }
+    if organ.state.rests() {
+        warn!(
+            "{entity}: grow_now waits until its severed vessels are whole again; set Cuttable::growth to let it grow"
+        );
     }
     run_to_end(&mut organ.state, &mut organ.progress);
 }

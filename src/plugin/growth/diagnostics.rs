@@ -1,6 +1,6 @@
 //! Growth diagnostics, for logs and overlays.
 
-use crate::plugin::growth::{budget::GrowthFrame, progress::GrowthProgress};
+use crate::plugin::growth::{budget::GrowthFrame, progress::GrowthProgress, shared::SharedTissues};
 use crate::synthesis::tree::ByKind;
 use bevy::{
     app::App,
@@ -19,17 +19,27 @@ pub const NODES: DiagnosticPath = DiagnosticPath::const_new("vessels/nodes");
 /// Attraction points of all organs that wait for a vessel.
 pub const WAITING: DiagnosticPath = DiagnosticPath::const_new("vessels/waiting");
 
+/// Prepared tissues that organs grow on or wait for: one for all organs with the same mesh and
+/// [`Vasculature::tissue`](crate::plugin::Vasculature::tissue).
+pub const TISSUES: DiagnosticPath = DiagnosticPath::const_new("vessels/tissues");
+
 /// Registers the diagnostics.
 pub(crate) fn register(app: &mut App) {
     app.register_diagnostic(Diagnostic::new(STEPS))
         .register_diagnostic(Diagnostic::new(STEP_TIME).with_suffix(" ms"))
         .register_diagnostic(Diagnostic::new(GROWTH_TIME).with_suffix(" ms"))
         .register_diagnostic(Diagnostic::new(NODES).with_smoothing_factor(0.0))
-        .register_diagnostic(Diagnostic::new(WAITING).with_smoothing_factor(0.0));
+        .register_diagnostic(Diagnostic::new(WAITING).with_smoothing_factor(0.0))
+        .register_diagnostic(Diagnostic::new(TISSUES).with_smoothing_factor(0.0));
 }
 
 /// Measures a frame.
-pub(crate) fn measure(mut diagnostics: Diagnostics, frame: Res<GrowthFrame>, organs: Query<&GrowthProgress>) {
+pub(crate) fn measure(
+    mut diagnostics: Diagnostics,
+    frame: Res<GrowthFrame>,
+    tissues: Res<SharedTissues>,
+    organs: Query<&GrowthProgress>,
+) {
     let total = |count: fn(&GrowthProgress) -> ByKind<usize>| -> f64 {
         organs.iter().map(|progress| count(progress).values().sum::<usize>()).sum::<usize>() as f64
     };
@@ -38,4 +48,5 @@ pub(crate) fn measure(mut diagnostics: Diagnostics, frame: Res<GrowthFrame>, org
     diagnostics.add_measurement(&GROWTH_TIME, || frame.time().as_secs_f64() * 1000.0);
     diagnostics.add_measurement(&NODES, || total(|progress| progress.nodes));
     diagnostics.add_measurement(&WAITING, || total(|progress| progress.waiting));
+    diagnostics.add_measurement(&TISSUES, || tissues.count() as f64);
 }

@@ -1,10 +1,15 @@
 //! The inputs of a growth (an organ's [`Vasculature`], paint and assets), and the work that a change of them needs.
 
+use crate::plugin::organ::image::OrganImage;
 use crate::synthesis::{
     preset::Preset,
     tissue::{TissuePaint, TissueSource},
 };
-use bevy::{asset::AssetId, image::Image, mesh::Mesh};
+use bevy::{
+    asset::AssetId,
+    image::Image,
+    mesh::{Mesh, Mesh3d},
+};
 use std::sync::Arc;
 
 /// Work to do before an organ can grow on. Each variant includes those before it.
@@ -22,15 +27,20 @@ pub(crate) enum Need {
 }
 
 /// The assets that a tissue may be made from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct SourceAssets {
     pub(crate) mesh: Option<AssetId<Mesh>>,
     pub(crate) image: Option<AssetId<Image>>,
 }
 
 impl SourceAssets {
+    /// The assets of an organ.
+    pub(crate) fn of(mesh: Option<&Mesh3d>, image: Option<&OrganImage>) -> Self {
+        Self { mesh: mesh.map(|mesh| mesh.id()), image: image.map(|image| image.id()) }
+    }
+
     /// The assets that a source needs.
-    fn needed_by(self, source: &TissueSource) -> Self {
+    pub(crate) fn needed_by(self, source: &TissueSource) -> Self {
         Self { mesh: self.mesh.filter(|_| source.needs_mesh()), image: self.image.filter(|_| source.image().is_some()) }
     }
 }

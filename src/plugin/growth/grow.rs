@@ -10,6 +10,7 @@ use crate::plugin::growth::budget::{GrowthBudget, GrowthFrame, begin_after, shar
 use crate::plugin::growth::{
     messages::GrowthFinished,
     progress::{GrowthControl, GrowthPhase, GrowthProgress},
+    source::{Organ, StartMessages},
     state::GrowthState,
 };
 use bevy::{
@@ -30,13 +31,18 @@ pub(crate) fn grow(
 ) {
     let start = Instant::now();
     let mut steps = 0;
-    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.must_repeat_steps()) {
+    let mut restored = Vec::new();
+    for (organ, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.must_repeat_steps()) {
         steps += catch_up(&mut state, &mut progress);
+        restored.push(organ);
     }
-    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(_, _, state, _)| state.finish) {
+    let may_finish = |organ: &Entity, state: &GrowthState| state.finish && !restored.contains(organ);
+    for (_, _, mut state, mut progress) in organs.iter_mut().filter(|(organ, _, state, _)| may_finish(organ, state)) {
         steps += run_to_end(&mut state, &mut progress);
     }
-    let waiting = organs.iter().filter(|(_, control, state, _)| state.may_step(**control));
+    // Wounds are given back to vessels that are as they were saved, before these grow on.
+    let waiting =
+        organs.iter().filter(|(organ, control, state, _)| state.may_step(**control) && !restored.contains(organ));
     let mut round: Vec<_> = waiting.map(|(organ, _, state, _)| (organ, state.costs.expected())).collect();
     round.sort_unstable_by_key(|&(organ, _)| organ);
     begin_after(&mut round, *last);
@@ -72,6 +78,15 @@ pub(crate) fn end_growths(
     }
 }
 
+/// Fails the organs of which a step has panicked.
+pub(crate) fn end_panicked(mut organs: Query<Organ>, mut messages: StartMessages) {
+    for mut organ in organs.iter_mut().filter(|organ| organ.state.has_panicked()) {
+        if let Some(error) = organ.state.take_panic() {
+            organ.report(Err(error), &mut messages);
+        }
+    }
+}
+
 /// Does one step of an organ.
 fn step(state: &mut GrowthState, progress: &mut GrowthProgress) {
     let start = Instant::now();
@@ -103,8 +118,8 @@ fn catch_up(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
 
 /// Does all remaining steps of an organ that has its tissue, and returns their number.
 pub(crate) fn run_to_end(state: &mut GrowthState, progress: &mut GrowthProgress) -> u32 {
-    if !state.is_growing() {
-        // Without a tissue the request stays; at the end it is fulfilled.
+    if !state.is_growing() || state.rests() {
+        // Without a tissue and with wounds the request stays; at the end it is fulfilled.
         state.finish &= !state.is_done();
         return 0;
     }

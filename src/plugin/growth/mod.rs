@@ -23,14 +23,18 @@ pub(crate) mod followed;
 pub(crate) mod grow;
 pub(crate) mod messages;
 pub(crate) mod paint;
+pub(crate) mod preparation;
 pub(crate) mod progress;
 pub(crate) mod publish;
+pub(crate) mod shared;
 pub(crate) mod source;
+pub(crate) mod start;
 pub(crate) mod state;
 pub(crate) mod steps;
 pub(crate) mod successor;
 pub(crate) mod tissue;
 pub(crate) mod vasculature;
+mod waiting;
 
 pub use budget::{GrowthBudget, GrowthFrame};
 pub use commands::EntityCommandsExt;
@@ -39,6 +43,8 @@ pub use paint::OrganPaint;
 pub use progress::{GrowthControl, GrowthPhase, GrowthProgress};
 pub use state::GrowthState;
 pub use vasculature::Vasculature;
+
+use shared::SharedTissues;
 
 /// Grows vessels on every entity with a [`Vasculature`]. Needs no window and no renderer, only mesh assets:
 /// `DefaultPlugins`, or `AssetPlugin` and `MeshPlugin`.
@@ -78,6 +84,7 @@ impl Plugin for GrowthPlugin {
         order::configure(app, self.schedule);
         app.insert_resource(self.budget)
             .init_resource::<GrowthFrame>()
+            .init_resource::<SharedTissues>()
             .add_message::<GrowthCommand>()
             .add_message::<GrowthStarted>()
             .add_message::<GrowthFinished>()
@@ -89,8 +96,9 @@ impl Plugin for GrowthPlugin {
             source::apply_commands,
             source::notice_changes,
             source::begin,
-            source::receive_tissues,
+            source::receive,
             source::show_preparations,
+            waiting::warn_of_waiting,
         );
         // The rooms that follow find the vessels of this frame.
         let publish = (publish::publish_vessels, grow::end_growths, ApplyDeferred);
@@ -99,7 +107,10 @@ impl Plugin for GrowthPlugin {
             (
                 budget::begin_frame.before(VesselSystems::Source),
                 source.chain_ignore_deferred().in_set(VesselSystems::Source).run_if(any_with_component::<GrowthState>),
-                grow::grow.in_set(VesselSystems::Grow).run_if(any_with_component::<GrowthState>),
+                (grow::grow, grow::end_panicked)
+                    .chain_ignore_deferred()
+                    .in_set(VesselSystems::Grow)
+                    .run_if(any_with_component::<GrowthState>),
                 publish
                     .chain_ignore_deferred()
                     .in_set(VesselSystems::Publish)

@@ -16,12 +16,16 @@ pub enum GrowthPhase {
     WaitingForMesh,
     /// The image that the tissue is read from is still being loaded.
     WaitingForImage,
-    /// The tissue is being made from the mesh or another source. Large organs do this in a job, as
-    /// [`JobSettings`](crate::plugin::JobSettings) say.
+    /// The tissue is being made from the mesh or another source, or roots are placed on it. Large organs do this in a
+    /// job, as [`JobSettings`](crate::plugin::JobSettings) say. Vessels that start again, with another seed say, stay
+    /// until then.
     PreparingTissue,
     /// Steps are being done, as the [budget](crate::plugin::GrowthBudget) allows. A paused growth is in this phase,
     /// too.
     Growing,
+    /// No steps are done until severed vessels are whole again, as
+    /// [`Cuttable::growth`](crate::plugin::Cuttable::growth) says.
+    Held,
     /// The organ's [paint](crate::plugin::OrganPaint) has changed, and new vessels grow unseen on the new paint. The
     /// drawn vessels stay until the new ones have done as many steps. Numbers of steps and nodes are those of the new
     /// vessels.
@@ -77,6 +81,11 @@ impl GrowthProgress {
     /// Whether all steps are done.
     pub fn is_finished(&self) -> bool {
         self.phase == GrowthPhase::Finished
+    }
+
+    /// Whether the vessels have grown as far as they do for now: all steps are done, or wait for wounds to heal.
+    pub(crate) fn is_settled(&self) -> bool {
+        matches!(self.phase, GrowthPhase::Finished | GrowthPhase::Held)
     }
 }
 

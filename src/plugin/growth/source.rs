@@ -1,9 +1,9 @@
 //! Source: from an organ's [`Vasculature`] and its mesh, or another source of tissue, to a growth that can step.
 //!
 //! Each frame, commands are carried out; then the vasculature, paint and assets are compared with what the growth
-//! follows; then the work that a difference needs is done. A job prepares a new tissue, and another one lays new paint
-//! over it. A growth on the same tissue starts at once and reuses its buffers. If many growths start together, the
-//! budget spreads them over frames.
+//! follows; then the work that a difference needs is done. A job prepares a new tissue, for all organs that share it.
+//! Another one lays paint over it and starts the growth. A start that takes no time is done at once, and reuses the
+//! buffers of the growth before. If many growths start together, the budget spreads them over frames.
 
 use crate::plugin::{
     announcer::Announcer,
@@ -13,14 +13,17 @@ use crate::plugin::{
         messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganGrowthError},
         paint::OrganPaint,
         progress::{GrowthControl, GrowthPhase, GrowthProgress},
+        shared::{SharedTissue, SharedTissues},
+        start::StartOrder,
         state::GrowthState,
-        tissue::{Copied, OrganAssets, Painted, PaintedTissue},
+        tissue::{Found, OrganAssets, PaintedTissue, SourceCopy},
         vasculature::Vasculature,
     },
     job::Jobs,
     organ::{image::OrganImage, rest::RestMesh},
 };
 use crate::synthesis::{
+    growth::GrowthWarning,
     pace::{Pace, at_once},
     preset::Preset,
     tissue::TissuePaint,
@@ -82,10 +85,13 @@ pub(crate) fn notice_changes(
     mut mesh_events: MessageReader<AssetEvent<Mesh>>,
     mut image_events: MessageReader<AssetEvent<Image>>,
     meshes: Res<Assets<Mesh>>,
+    mut tissues: ResMut<SharedTissues>,
     mut organs: Query<Organ>,
 ) {
     let mesh_news: Vec<_> = mesh_events.read().filter_map(news).collect();
     let image_news: Vec<_> = image_events.read().filter_map(news).collect();
+    mesh_news.iter().filter(|(_, replaced)| *replaced).for_each(|&(mesh, _)| tissues.forget_mesh(mesh));
+    image_news.iter().filter(|(_, replaced)| *replaced).for_each(|&(image, _)| tissues.forget_image(image));
     for mut organ in &mut organs {
         organ.follow();
         for &(image, replaced) in &image_news {
@@ -103,7 +109,7 @@ pub(crate) fn notice_changes(
 
 /// Begins the work that is needed: preparing a tissue, painting it, or a growth on the current tissue.
 pub(crate) fn begin(
-    assets: OrganAssets,
+    mut assets: OrganAssets,
     mut organs: Query<Organ>,
     mut messages: StartMessages,
     mut account: StartAccount,
@@ -112,18 +118,23 @@ pub(crate) fn begin(
     let waiting = organs.iter().filter(|organ| organ.state.need != Need::Nothing).map(|organ| organ.entity);
     account.start_in_turn(waiting.collect(), |organ| {
         let Ok(mut organ) = organs.get_mut(organ) else { return };
-        let outcome = organ.begin(&assets, Some(&jobs));
+        let outcome = organ.begin(&mut assets, Some(&jobs));
         organ.report(outcome, &mut messages);
     });
 }
 
-/// Starts the growth on tissues that have become ready.
-pub(crate) fn receive_tissues(mut organs: Query<Organ>, mut messages: StartMessages, mut account: StartAccount) {
-    let ready = organs.iter().filter(|organ| organ.state.is_tissue_ready()).map(|organ| organ.entity);
+/// Starts the growth on tissues that have become ready, and takes over growths that have started.
+pub(crate) fn receive(mut organs: Query<Organ>, mut messages: StartMessages, mut account: StartAccount, jobs: Jobs) {
+    let ready = organs.iter().filter(|organ| organ.state.is_prepared()).map(|organ| organ.entity);
     account.start_in_turn(ready.collect(), |organ| {
         let Ok(mut organ) = organs.get_mut(organ) else { return };
-        if let Some(prepared) = organ.state.poll_preparation() {
-            let outcome = prepared.and_then(|tissue| organ.start(tissue));
+        if let Some(tissue) = organ.state.poll_tissue() {
+            let outcome = tissue.and_then(|tissue| organ.start(tissue, Some(&jobs)));
+            organ.report(outcome, &mut messages);
+        }
+        if let Some(start) = organ.state.poll_start() {
+            let outcome =
+                start.and_then(|started| organ.state.accept(started)).map(|warnings| organ.enter_growth(warnings));
             organ.report(outcome, &mut messages);
         }
     });
@@ -183,7 +194,7 @@ type Started = bool;
 impl OrganItem<'_, '_> {
     /// Compares the organ with what its growth follows.
     pub(crate) fn follow(&mut self) {
-        let assets = SourceAssets { mesh: self.mesh.map(|mesh| mesh.id()), image: self.image.map(|image| image.id()) };
+        let assets = SourceAssets::of(self.mesh, self.image);
         self.state.bypass_change_detection().resume(self.progress.step);
         let is_painted = match &self.paint {
             Some(paint) => paint.is_changed(),
@@ -192,12 +203,14 @@ impl OrganItem<'_, '_> {
         if self.wish.is_changed() || is_painted || self.state.follows_other_assets(assets) {
             let blank = TissuePaint::default();
             let paint = self.paint.as_ref().map_or(&blank, |paint| &paint.0);
-            self.state.follow(Preset::from(&*self.wish), self.wish.seed, paint, assets);
+            // Blood makes no vessels.
+            let settings = Preset { blood: None, ..Preset::from(&*self.wish) };
+            self.state.follow(settings, self.wish.seed, paint, assets);
         }
     }
 
-    /// Does what is needed next. Jobs prepare and paint the tissue; without jobs it is done synchronously.
-    pub(crate) fn begin(&mut self, assets: &OrganAssets, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
+    /// Does what is needed next. Jobs prepare the tissue and start the growth; without jobs it is done synchronously.
+    pub(crate) fn begin(&mut self, assets: &mut OrganAssets, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         match self.state.next_need() {
             Need::Nothing => Ok(false),
             Need::Tissue => self.prepare(assets, jobs),
@@ -205,58 +218,70 @@ impl OrganItem<'_, '_> {
         }
     }
 
-    /// Prepares and paints the tissue.
-    fn prepare(&mut self, assets: &OrganAssets, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
+    /// Prepares the tissue, or waits with other organs that share it.
+    fn prepare(&mut self, assets: &mut OrganAssets, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         self.state.drop_tissue();
-        let copy = match assets.copy(&self.wish.tissue, self.mesh, self.image)? {
-            Copied::Source(copy) => copy,
-            Copied::NoMeshYet => return self.wait(GrowthPhase::WaitingForMesh),
-            Copied::NoImageYet => return self.wait(GrowthPhase::WaitingForImage),
+        let shared = match assets.find(&self.wish.tissue, self.mesh, self.image, jobs.is_some())? {
+            Found::Tissue(shared) => shared,
+            Found::New(shared, copy) => {
+                self.make(&shared, copy, jobs);
+                shared
+            }
+            Found::NoMeshYet => return self.wait(GrowthPhase::WaitingForMesh),
+            Found::NoImageYet => return self.wait(GrowthPhase::WaitingForImage),
         };
         self.enter(GrowthPhase::PreparingTissue);
-        let (source, paint) = (self.wish.tissue.clone(), self.state.paint());
-        self.run(copy.work(&source).saturating_add(paint.work()), jobs, |pace| copy.prepare(source, paint, pace))
+        self.state.await_tissue(shared);
+        if jobs.is_some() {
+            return Ok(false);
+        }
+        self.state.poll_tissue().map_or(Ok(false), |tissue| self.start(tissue?, jobs))
     }
 
-    /// Grows on the current tissue, after painting it if its paint is outdated. After a stroke, vessels grow beside the
-    /// drawn ones.
+    /// Makes a tissue from the copied part of its assets.
+    fn make(&self, shared: &SharedTissue, copy: SourceCopy, jobs: Option<&Jobs>) {
+        let source = self.wish.tissue.clone();
+        let Some(jobs) = jobs else {
+            shared.fill(at_once(copy.prepare(source, Pace::default())));
+            return;
+        };
+        shared.await_job(jobs.start(copy.work(&source), |pace| copy.prepare(source, pace)));
+    }
+
+    /// Grows on the current tissue. After a stroke of paint, vessels grow beside the drawn ones.
     fn grow_on_tissue_at_hand(&mut self, need: Need, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
         self.state.choose_place(need);
         if self.state.cancel_if_undone() {
             return self.wait(self.state.phase());
         }
-        let (paint, tissue) = (self.state.paint(), self.state.tissue_at_hand().cloned());
-        let Some(tissue) = tissue else { return Ok(false) };
-        if *tissue.paint == *paint {
-            return self.start(tissue);
-        }
-        let phase = if self.state.is_beside() { GrowthPhase::Regrowing } else { GrowthPhase::PreparingTissue };
-        self.enter(phase);
-        self.run(tissue.work(&paint), jobs, |pace| tissue.repainted(paint, pace))
+        let Some(tissue) = self.state.tissue_at_hand().cloned() else { return Ok(false) };
+        self.start(tissue, jobs)
     }
 
-    /// Makes a tissue in a job, without waiting for it. Without jobs, makes it now and starts the growth on it.
-    fn run<W>(
-        &mut self,
-        items: usize,
-        jobs: Option<&Jobs>,
-        work: impl FnOnce(Pace) -> W,
-    ) -> Result<Started, OrganGrowthError>
-    where
-        W: Future<Output = Painted> + Send + 'static,
-    {
-        let Some(jobs) = jobs else { return self.start(at_once(work(Pace::default()))?) };
-        self.state.await_tissue(jobs.start(items, work));
-        Ok(false)
+    /// Starts the growth on a tissue, after painting it if its paint is outdated. A light start is done at once.
+    pub(crate) fn start(&mut self, tissue: PaintedTissue, jobs: Option<&Jobs>) -> Result<Started, OrganGrowthError> {
+        let order = self.state.order(tissue, Preset::from(&*self.wish), self.wish.seed);
+        let work = order.work();
+        let warnings = match jobs {
+            _ if order.has_its_paint() && (jobs.is_none() || work <= StartOrder::LIGHT) => self.state.start_now(order),
+            None => at_once(order.carry_out(Pace::default())).and_then(|started| self.state.accept(started)),
+            Some(jobs) => {
+                let phase = if self.state.is_beside() { GrowthPhase::Regrowing } else { GrowthPhase::PreparingTissue };
+                self.enter(phase);
+                self.state.await_start(jobs.start(work, |pace| order.carry_out(pace)));
+                return Ok(false);
+            }
+        }?;
+        Ok(self.enter_growth(warnings))
     }
 
-    /// Starts the growth on a tissue.
-    pub(crate) fn start(&mut self, tissue: PaintedTissue) -> Result<Started, OrganGrowthError> {
-        for warning in self.state.start(tissue, Preset::from(&*self.wish), self.wish.seed)? {
+    /// Enters the phase of a growth that has started.
+    fn enter_growth(&mut self, warnings: Vec<GrowthWarning>) -> Started {
+        for warning in warnings {
             warn!("{}: {warning}", self.entity);
         }
         self.enter(self.state.phase_of_steps());
-        Ok(true)
+        true
     }
 
     /// Reports that the growth has started, or why it hasn't.

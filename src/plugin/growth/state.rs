@@ -7,11 +7,14 @@ use crate::plugin::{
         budget::Costs,
         followed::{Followed, Need, SourceAssets},
         messages::{GrowthAction, OrganGrowthError},
+        preparation::Preparation,
         progress::{GrowthControl, GrowthPhase},
+        shared::SharedTissue,
+        start::{Start, StartOrder, StartedGrowth},
         successor::Successor,
-        tissue::{Painted, PaintedTissue},
+        tissue::PaintedTissue,
     },
-    job::Job,
+    job::{Job, JobPanic},
     lineage::Lineage,
     organ::{image::OrganImageError, mesh::OrganMeshError},
 };
@@ -32,8 +35,8 @@ pub struct GrowthState {
     pub(crate) need: Need,
     /// The inputs that the growth follows, or is about to.
     followed: Option<Followed>,
-    /// A tissue being prepared or painted. Dropping the job stops it, so no outdated tissue ever arrives.
-    preparation: Option<Job<Painted>>,
+    /// A tissue that is awaited, or a growth being started. Dropping it stops it, so that nothing outdated arrives.
+    preparation: Option<Preparation>,
     /// Whether the next growth to start grows unseen, beside vessels that stay meanwhile.
     beside: bool,
     pub(super) tissue: Option<PaintedTissue>,
@@ -45,6 +48,12 @@ pub struct GrowthState {
     /// Lineages of the growth's trees.
     pub(super) lineages: ByKind<Lineage>,
     error: Option<OrganGrowthError>,
+    /// The panic of a step, until it is reported.
+    pub(super) panic: Option<JobPanic>,
+    /// Whether steps wait until severed vessels are whole again.
+    held: bool,
+    /// Frames for which it has waited for something that nobody loads.
+    pub(crate) waited: u32,
     /// Warnings already given about the settings.
     warned: Vec<GrowthWarning>,
     /// Steps that the growth had done when its organ was saved, and repeats at once.
@@ -248,71 +257,91 @@ impl GrowthState {
     }
 
     /// Begins to wait for a tissue.
-    pub(crate) fn await_tissue(&mut self, preparation: Job<Painted>) {
+    pub(crate) fn await_tissue(&mut self, tissue: Arc<SharedTissue>) {
+        self.wait_for(Preparation::Tissue(tissue));
+    }
+
+    /// Begins to wait for the start of a growth.
+    pub(crate) fn await_start(&mut self, start: Job<Start>) {
+        self.wait_for(Preparation::Start(start));
+    }
+
+    fn wait_for(&mut self, preparation: Preparation) {
         self.preparation = Some(preparation);
         self.successor = None;
         self.need = Need::Nothing;
     }
 
-    /// Whether a tissue has been prepared and its growth has not started.
-    pub(crate) fn is_tissue_ready(&self) -> bool {
-        self.preparation.as_ref().is_some_and(Job::is_done)
+    /// Whether what is awaited is ready.
+    pub(crate) fn is_prepared(&self) -> bool {
+        self.preparation.as_ref().is_some_and(Preparation::is_ready)
     }
 
     /// Share of the preparation that is done, if one is under way.
     pub(crate) fn preparation_progress(&self) -> Option<f32> {
-        self.preparation.as_ref().map(Job::progress)
+        self.preparation.as_ref().map(Preparation::progress)
     }
 
-    /// The result of the preparation, once it is ready. `None` if the request has changed meanwhile: a tissue is kept,
-    /// to be painted again, unless it is made from something else now; an error may be outdated.
-    pub(crate) fn poll_preparation(&mut self) -> Option<Painted> {
-        match Job::poll(&mut self.preparation)?.unwrap_or_else(|panic| Err(panic.into())) {
-            _ if self.need == Need::Tissue => None,
-            Ok(tissue) if *tissue.paint != *self.paint() => {
-                self.tissue.get_or_insert(tissue);
-                None
-            }
-            Err(_) if self.need != Need::Nothing => None,
-            result => Some(result),
+    /// Takes over an awaited tissue, once it is ready. A growth is to start on it then. `None` if the request has
+    /// changed meanwhile, or something else is awaited.
+    pub(crate) fn poll_tissue(&mut self) -> Option<Result<PaintedTissue, OrganGrowthError>> {
+        let tissue = Preparation::poll_tissue(&mut self.preparation)?;
+        (self.need != Need::Tissue).then_some(tissue)
+    }
+
+    /// The growth that was being started, once it is ready. `None` if the request has changed meanwhile: its tissue is
+    /// kept, unless it is made from something else now; an error may be outdated.
+    pub(crate) fn poll_start(&mut self) -> Option<Start> {
+        let start = Preparation::poll_start(&mut self.preparation)?;
+        let is_outdated = match (&start, self.need) {
+            (_, Need::Tissue) => return None,
+            (Ok(started), Need::Nothing | Need::Paint) => *started.tissue.paint != *self.paint(),
+            (Ok(_), Need::Growth) => true,
+            (Err(_), need) => need != Need::Nothing,
+        };
+        if !is_outdated {
+            return Some(start);
         }
+        if let Ok(started) = start {
+            self.tissue.get_or_insert(started.tissue);
+        }
+        None
     }
 
-    /// Starts the growth on a tissue. Buffers are reused if it is the current one.
+    /// The order to start the growth that is asked for.
+    pub(crate) fn order(&self, tissue: PaintedTissue, settings: Preset, seed: u64) -> StartOrder {
+        StartOrder { tissue, paint: self.paint(), settings, seed }
+    }
+
+    /// Starts a growth now, on a tissue with its paint. Memory is reused if it is the current one.
     ///
     /// Returns the warnings about the settings that have not been given before.
-    pub(crate) fn start(
-        &mut self,
-        painted: PaintedTissue,
-        settings: Preset,
-        seed: u64,
-    ) -> Result<Vec<GrowthWarning>, OrganGrowthError> {
+    pub(crate) fn start_now(&mut self, order: StartOrder) -> Result<Vec<GrowthWarning>, OrganGrowthError> {
+        let before = if self.beside { None } else { self.growth.take() };
+        self.accept(order.carry_out_now(before))
+    }
+
+    /// Takes over a growth that has been started.
+    ///
+    /// Returns the warnings about the settings that have not been given before.
+    pub(crate) fn accept(&mut self, started: StartedGrowth) -> Result<Vec<GrowthWarning>, OrganGrowthError> {
         self.need = Need::Nothing;
         self.preparation = None;
         self.successor = None;
         self.error = None;
-        let tissue = Arc::clone(&painted.tissue);
-        let Preset { mut generator, roots, fit, .. } = settings;
-        if fit {
-            generator = generator.fit(tissue.extent());
-        }
-        let roots = roots.into();
+        let StartedGrowth { tissue, growth } = started;
         let warnings = if let (true, Some(drawn)) = (self.beside, &self.growth) {
-            let growth = generator.start(tissue, &roots, seed)?;
+            let growth = growth?;
             let warnings = growth.warnings();
-            self.successor = Some(Successor::of(&**drawn, painted, growth));
+            self.successor = Some(Successor::of(&**drawn, tissue, growth));
             // A generator may do everything at its start. No step follows then.
             self.succeed();
             warnings
         } else {
             self.begin_trees();
             self.costs = Costs::default();
-            self.tissue = Some(painted);
-            let growth = match self.growth.take() {
-                Some(growth) => generator.restart(growth, tissue, &roots, seed),
-                None => generator.start(tissue, &roots, seed),
-            }?;
-            self.growth.insert(growth).warnings()
+            self.tissue = Some(tissue);
+            self.growth.insert(growth?).warnings()
         };
         self.beside = false;
         Ok(self.new_warnings(warnings))
@@ -328,6 +357,28 @@ impl GrowthState {
         let new = warnings.iter().filter(|warning| !self.warned.contains(warning)).cloned().collect();
         self.warned = warnings;
         new
+    }
+
+    /// Lets steps wait, or go on.
+    pub(crate) fn hold(&mut self, held: bool) {
+        self.held = held;
+    }
+
+    /// Whether steps wait until severed vessels are whole again.
+    pub(crate) fn is_held(&self) -> bool {
+        self.held
+    }
+
+    /// Whether a step has panicked.
+    pub(crate) fn has_panicked(&self) -> bool {
+        self.panic.is_some()
+    }
+
+    /// Takes the panic of a step, as an error that ends the growth. If that was to replace drawn vessels, these stay.
+    pub(crate) fn take_panic(&mut self) -> Option<OrganGrowthError> {
+        let panic = self.panic.take()?;
+        self.beside = self.successor.is_some();
+        Some(panic.into())
     }
 
     /// Ends the work under way because of an error. Vessels of an earlier growth are dropped, too, since they are
@@ -354,7 +405,11 @@ impl GrowthState {
 
     /// The phase of a growth that starts, or that has just done a step.
     pub(crate) fn phase_of_steps(&self) -> GrowthPhase {
-        if self.successor.is_some() { GrowthPhase::Regrowing } else { GrowthPhase::Growing }
+        match &self.successor {
+            Some(_) => GrowthPhase::Regrowing,
+            None if self.held => GrowthPhase::Held,
+            None => GrowthPhase::Growing,
+        }
     }
 
     /// Lineage of the tissue that it grows on. Each preparation changes it; paint does not.
@@ -366,45 +421,53 @@ impl GrowthState {
 #[cfg(test)]
 mod tests {
     use crate::plugin::{
-        growth::{state::*, tissue::SourceCopy},
+        growth::{shared::SharedTissues, state::*},
         job::{self, Jobs},
     };
     use crate::synthesis::{
         pace::Pace,
         preset::PresetName,
-        tissue::{TissueError, TissueShape},
+        tissue::{SourceData, TissueError, TissueShape},
     };
     use bevy::{
         app::{App, Update},
         ecs::{schedule::ScheduleLabel, system::SystemState},
     };
 
-    /// A growth that waits for a preparation, which is done.
-    fn prepared<W: Future<Output = Painted> + Send + 'static>(preparation: impl FnOnce(Pace) -> W) -> GrowthState {
-        let mut state = GrowthState::default();
-        await_done(&mut state, preparation);
-        state
-    }
-
-    /// Lets a growth wait for a preparation, which is done.
-    fn await_done<W: Future<Output = Painted> + Send + 'static>(
-        state: &mut GrowthState,
-        preparation: impl FnOnce(Pace) -> W,
-    ) {
+    /// Lets a growth wait for a start, which is done.
+    fn await_done<W: Future<Output = Start> + Send + 'static>(state: &mut GrowthState, start: impl FnOnce(Pace) -> W) {
         let mut app = App::new();
         job::register(&mut app, Update.intern());
         let mut jobs = SystemState::<Jobs>::new(app.world_mut());
-        state.await_tissue(jobs.get(app.world()).expect("jobs are registered").start(0, preparation));
-        assert!(state.is_tissue_ready());
+        state.await_start(jobs.get(app.world()).expect("jobs are registered").start(0, start));
+        assert!(state.is_prepared());
+    }
+
+    /// A growth that waits for a start, which is done.
+    fn prepared<W: Future<Output = Start> + Send + 'static>(start: impl FnOnce(Pace) -> W) -> GrowthState {
+        let mut state = GrowthState::default();
+        await_done(&mut state, start);
+        state
+    }
+
+    /// A growth that follows settings and waits for the tissue of a ball, which is there.
+    fn with_ball() -> (GrowthState, Preset) {
+        let mut state = GrowthState::default();
+        let wish = Preset { tissue: TissueShape::ball(1.0).into(), ..PresetName::Paper.load() };
+        state.follow(wish.clone(), 0, &TissuePaint::default(), SourceAssets::default());
+        let shared = SharedTissues::default().get(&wish.tissue, SourceAssets::default());
+        shared.fill(wish.tissue.prepare(&SourceData::default()).map_err(Into::into));
+        state.await_tissue(shared);
+        (state, wish)
     }
 
     #[test]
-    fn a_preparation_that_panics_is_an_error_and_can_be_tried_again() {
+    fn a_start_that_panics_is_an_error_and_can_be_tried_again() {
         let mut state = prepared(async |_| panic!("a vertex of {} edges", 1));
-        let Some(Err(error)) = state.poll_preparation() else { panic!("an error") };
+        let Some(Err(error)) = state.poll_start() else { panic!("an error") };
         assert!(matches!(&error, OrganGrowthError::Panicked(_)) && error.to_string().contains("a vertex of 1 edges"));
         state.fail(error);
-        assert!(state.error().is_some() && !state.is_tissue_ready());
+        assert!(state.error().is_some() && !state.is_prepared());
         state.apply(GrowthAction::Restart, GrowthControl::Running);
         assert_eq!(state.next_need(), Need::Tissue);
     }
@@ -413,21 +476,31 @@ mod tests {
     fn what_was_wrong_does_not_count_once_something_else_is_asked_for() {
         let mut state = prepared(async |_| Err(TissueError::NoMesh.into()));
         state.apply(GrowthAction::Restart, GrowthControl::Running);
-        assert!(state.poll_preparation().is_none());
+        assert!(state.poll_start().is_none());
         assert_eq!(state.next_need(), Need::Tissue);
     }
 
     #[test]
     fn a_tissue_is_outdated_once_the_organ_is_made_from_something_else() {
-        let mut state = GrowthState::default();
-        let mut wish = Preset { tissue: TissueShape::ball(1.0).into(), ..PresetName::Paper.load() };
-        state.follow(wish.clone(), 0, &TissuePaint::default(), SourceAssets::default());
-        let ball = wish.tissue.clone();
-        await_done(&mut state, |pace| SourceCopy::Nothing.prepare(ball, Arc::default(), pace));
+        let (mut state, mut wish) = with_ball();
+        assert!(state.is_prepared());
         wish.tissue = TissueShape::ball(2.0).into();
         state.follow(wish, 0, &TissuePaint::default(), SourceAssets::default());
-        assert!(state.poll_preparation().is_none());
+        assert!(state.poll_tissue().is_none());
         assert_eq!(state.next_need(), Need::Tissue);
+    }
+
+    #[test]
+    fn a_start_with_another_seed_leaves_its_tissue() {
+        let (mut state, wish) = with_ball();
+        let tissue = state.poll_tissue().expect("it is there").expect("a ball");
+        let order = state.order(tissue, wish.clone(), 0);
+        await_done(&mut state, |pace| order.carry_out(pace));
+        state.follow(wish, 1, &TissuePaint::default(), SourceAssets::default());
+        assert_eq!(state.next_need(), Need::Nothing, "it waits for the tissue");
+        assert!(state.poll_start().is_none());
+        assert_eq!(state.next_need(), Need::Growth, "on the tissue at hand");
+        assert!(state.tissue().is_some() && state.growth().is_none());
     }
 
     #[test]

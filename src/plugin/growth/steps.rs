@@ -2,6 +2,7 @@
 
 use crate::plugin::{
     growth::{progress::GrowthControl, state::GrowthState, successor::Successor},
+    job::catch_panic,
     lineage::Lineage,
 };
 use crate::synthesis::{
@@ -28,7 +29,7 @@ impl GrowthState {
     /// Whether there are steps left to do.
     pub(crate) fn is_growing(&self) -> bool {
         let is_under_way = self.active().is_some_and(|growth| !growth.is_finished());
-        is_under_way && self.error().is_none() && !self.awaits_others()
+        is_under_way && self.error().is_none() && !self.has_panicked() && !self.awaits_others()
     }
 
     /// Whether all steps are done and their result is drawn.
@@ -40,15 +41,30 @@ impl GrowthState {
     /// Whether a step may be done now.
     pub(crate) fn may_step(&self, control: GrowthControl) -> bool {
         let willing = control == GrowthControl::Running || self.granted > 0 || self.finish;
-        willing && self.is_growing()
+        willing && self.is_growing() && !self.rests()
+    }
+
+    /// Whether wounds of the drawn vessels let them rest. Their successors, which have no wounds, grow on.
+    pub(crate) fn rests(&self) -> bool {
+        self.is_held() && self.successor.is_none()
     }
 
     /// Does one step, whose radii must be [settled](Self::settle) later. Does nothing without a growth or at its end.
     pub(crate) fn step(&mut self) {
-        let Some(growth) = self.active_mut().filter(|growth| !growth.is_finished()) else { return };
-        growth.advance();
-        self.granted = self.granted.saturating_sub(1);
-        self.unsettled = true;
+        self.attempt(|state| {
+            let Some(growth) = state.active_mut().filter(|growth| !growth.is_finished()) else { return };
+            growth.advance();
+            state.granted = state.granted.saturating_sub(1);
+            state.unsettled = true;
+        });
+    }
+
+    /// Does work on the growth. A generator outside this crate may panic: that ends its growth, and not the app.
+    fn attempt(&mut self, work: impl FnOnce(&mut Self)) {
+        if let Err(panic) = catch_panic(|| work(self)) {
+            self.panic = Some(panic);
+            self.unsettled = false;
+        }
     }
 
     /// Whether there are steps whose radii are to be settled.
@@ -59,6 +75,10 @@ impl GrowthState {
     /// Computes the radii after a frame's last step, and records what the steps changed. Once is enough, since many
     /// steps change the same radii, those of the trunks. A growth that is not drawn can wait.
     pub(crate) fn settle(&mut self) {
+        self.attempt(Self::settle_growth);
+    }
+
+    fn settle_growth(&mut self) {
         self.unsettled = false;
         if self.successor.is_some() {
             self.succeed();
@@ -97,11 +117,13 @@ impl GrowthState {
 
     /// Repeats the steps that were done before the organ was saved.
     pub(crate) fn catch_up(&mut self) {
-        for _ in 0..std::mem::take(&mut self.steps_to_repeat) {
-            let Some(growth) = self.growth.as_mut().filter(|growth| !growth.is_finished()) else { break };
-            growth.advance();
-        }
-        self.settle();
+        self.attempt(|state| {
+            for _ in 0..std::mem::take(&mut state.steps_to_repeat) {
+                let Some(growth) = state.growth.as_mut().filter(|growth| !growth.is_finished()) else { break };
+                growth.advance();
+            }
+            state.settle_growth();
+        });
     }
 
     /// Does all remaining steps.
@@ -109,11 +131,13 @@ impl GrowthState {
         // After so many steps, publishing everything is cheaper than recording every change.
         self.rebuild = ByKind::from_fn(|_| true);
         self.finish = false;
-        if let Some(growth) = self.active_mut() {
-            growth.run();
-        }
-        self.succeed();
-        self.take_updates();
+        self.attempt(|state| {
+            if let Some(growth) = state.active_mut() {
+                growth.run();
+            }
+            state.succeed();
+            state.take_updates();
+        });
     }
 
     /// Whether there is something to publish.

@@ -1,7 +1,11 @@
-//! The tissue of an organ: prepared from its assets, and painted.
+//! The tissue of an organ: prepared from its assets, shared with other organs, and painted.
 
 use crate::plugin::{
-    growth::messages::OrganGrowthError,
+    growth::{
+        followed::SourceAssets,
+        messages::OrganGrowthError,
+        shared::{Prepared, SharedTissue, SharedTissues},
+    },
     organ::{
         image::{OrganImage, OrganImageError, tissue_image},
         mesh::{MeshCopy, OrganMeshError, copy_mesh},
@@ -14,7 +18,10 @@ use crate::synthesis::{
 };
 use bevy::{
     asset::{Asset, AssetServer, Assets, Handle, LoadState},
-    ecs::{change_detection::Res, system::SystemParam},
+    ecs::{
+        change_detection::{Res, ResMut},
+        system::SystemParam,
+    },
     image::Image,
     mesh::{Mesh, Mesh3d},
 };
@@ -24,19 +31,22 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub(crate) struct PaintedTissue {
     base: PreparedTissue,
+    #[expect(dead_code, reason = "it keeps the tissue for other organs")]
+    shared: Arc<SharedTissue>,
     /// What was painted.
     pub(crate) paint: Arc<TissuePaint>,
     /// What vessels grow on.
     pub(crate) tissue: Arc<dyn Tissue>,
 }
 
-/// A painted tissue, or the reason why there is none.
-pub(crate) type Painted = Result<PaintedTissue, OrganGrowthError>;
-
 impl PaintedTissue {
-    async fn new(base: PreparedTissue, paint: Arc<TissuePaint>, pace: &Pace) -> Painted {
-        let tissue = base.painted_paced(&paint, pace).await?;
-        Ok(Self { base, paint, tissue })
+    /// A shared tissue without paint; `None` until it is ready.
+    pub(crate) fn blank(shared: &Arc<SharedTissue>) -> Option<Result<Self, OrganGrowthError>> {
+        let blank = |base: PreparedTissue| {
+            let (tissue, paint) = (Arc::clone(base.tissue()), Arc::default());
+            Self { base, shared: Arc::clone(shared), paint, tissue }
+        };
+        Some(shared.outcome()?.clone().map(blank))
     }
 
     /// The mesh that it is made from, if any.
@@ -46,12 +56,16 @@ impl PaintedTissue {
 
     /// Work of laying other paint over it, in items.
     pub(crate) fn work(&self, paint: &TissuePaint) -> usize {
-        self.base.painting_work(paint)
+        if *self.paint == *paint { 0 } else { self.base.painting_work(paint) }
     }
 
     /// The same tissue with other paint.
-    pub(crate) async fn repainted(self, paint: Arc<TissuePaint>, pace: Pace) -> Painted {
-        Self::new(self.base, paint, &pace).await
+    pub(crate) async fn repainted(self, paint: Arc<TissuePaint>, pace: &Pace) -> Result<Self, OrganGrowthError> {
+        if *self.paint == *paint {
+            return Ok(self);
+        }
+        let tissue = self.base.painted_paced(&paint, pace).await?;
+        Ok(Self { paint, tissue, ..self })
     }
 }
 
@@ -72,8 +86,8 @@ impl SourceCopy {
         })
     }
 
-    /// The slow part of the preparation. It depends on the copy and the arguments alone.
-    pub(crate) async fn prepare(self, source: TissueSource, paint: Arc<TissuePaint>, pace: Pace) -> Painted {
+    /// The slow part of the preparation. It depends on the copy and the source alone.
+    pub(crate) async fn prepare(self, source: TissueSource, pace: Pace) -> Prepared {
         let mut data = SourceData::default();
         let read = match (self, source.image()) {
             (Self::Mesh(mesh), _) => {
@@ -87,21 +101,34 @@ impl SourceCopy {
             }
             _ => 0.0,
         };
-        let prepared = source.prepare_paced(&data, &pace.part(read..0.9)).await?;
-        PaintedTissue::new(prepared, paint, &pace.part(0.9..1.0)).await
+        Ok(source.prepare_paced(&data, &pace.part(read..1.0)).await?)
     }
 }
 
-/// Where meshes and images come from.
+/// Where meshes, images and the tissues made from them come from.
 #[derive(SystemParam)]
 pub(crate) struct OrganAssets<'w> {
+    tissues: ResMut<'w, SharedTissues>,
     meshes: Res<'w, Assets<Mesh>>,
     images: Option<Res<'w, Assets<Image>>>,
     server: Option<Res<'w, AssetServer>>,
 }
 
+/// Tells which assets are being loaded.
+#[derive(SystemParam)]
+pub(crate) struct AssetsUnderWay<'w> {
+    server: Option<Res<'w, AssetServer>>,
+}
+
+impl AssetsUnderWay<'_> {
+    /// Whether an asset that isn't there is on its way.
+    pub(crate) fn is_coming<A: Asset>(&self, handle: &Handle<A>) -> bool {
+        self.server.as_ref().is_some_and(|server| server.load_state(handle.id()).is_loading())
+    }
+}
+
 /// Result of looking up an asset that a tissue is made from.
-pub(crate) enum Copied {
+enum Copied {
     /// A copy.
     Source(SourceCopy),
     /// There is no mesh yet, or it is being loaded.
@@ -110,9 +137,41 @@ pub(crate) enum Copied {
     NoImageYet,
 }
 
+/// Result of looking for the tissue of an organ.
+pub(crate) enum Found {
+    /// Another organ has it, or it is being prepared for one.
+    Tissue(Arc<SharedTissue>),
+    /// It has still to be prepared, from this copy.
+    New(Arc<SharedTissue>, SourceCopy),
+    /// There is no mesh yet, or it is being loaded.
+    NoMeshYet,
+    /// The image is being loaded.
+    NoImageYet,
+}
+
 impl OrganAssets<'_> {
+    /// Finds the tissue of an organ, or copies what it is to be made from. If the organ `may_wait`, a tissue that is
+    /// being prepared for another one serves.
+    pub(crate) fn find(
+        &mut self,
+        source: &TissueSource,
+        mesh: Option<&Mesh3d>,
+        image: Option<&OrganImage>,
+        may_wait: bool,
+    ) -> Result<Found, OrganGrowthError> {
+        let shared = self.tissues.get(source, SourceAssets::of(mesh, image));
+        if shared.is_ready() || (may_wait && !shared.is_new()) {
+            return Ok(Found::Tissue(shared));
+        }
+        Ok(match self.copy(source, mesh, image)? {
+            Copied::Source(copy) => Found::New(shared, copy),
+            Copied::NoMeshYet => Found::NoMeshYet,
+            Copied::NoImageYet => Found::NoImageYet,
+        })
+    }
+
     /// Copies the data that a source needs of an organ.
-    pub(crate) fn copy(
+    fn copy(
         &self,
         source: &TissueSource,
         mesh: Option<&Mesh3d>,

@@ -13,7 +13,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     generator::Generator,
-    preset::{Preset, PresetName},
+    preset::{OrganBlood, Preset, PresetName},
     roots::RootPlacements,
     tissue::TissueSource,
 };
@@ -27,8 +27,10 @@ use bevy::{
 /// The vessels to grow on an organ. Put it beside the organ's `Mesh3d`; if its [`tissue`](Self::tissue) is an image,
 /// beside an [`OrganImage`](crate::plugin::OrganImage). A plain shape needs neither.
 ///
-/// Changing any field starts the growth again at the next frame. The slow part, preparing the tissue, is repeated only
-/// if [`tissue`](Self::tissue), the mesh or the image changed. Removing the component removes the vessels.
+/// Changing any field that vessels depend on starts the growth again. The slow part, preparing the tissue, is repeated
+/// only if [`tissue`](Self::tissue), the mesh or the image changed; all organs with the same mesh and tissue share one.
+/// Roots that the seed chooses are placed in a job, and until then the old vessels stay. Removing the component removes
+/// the vessels.
 ///
 /// With [`fit`](Self::fit) off, all lengths are in the local space of the mesh. With `fit` on, they are shares of the
 /// organ's size.
@@ -59,6 +61,11 @@ pub struct Vasculature {
     ///
     /// If off, they are lengths in the mesh's local space. Default: true.
     pub fit: bool,
+    /// The blood of an organ of this kind, as its preset knows it: what a [`Perfusion`](crate::plugin::Perfusion) that
+    /// doesn't say otherwise lets through, and the size of the organ.
+    ///
+    /// Changing it leaves the vessels as they are. Default: unknown.
+    pub blood: Option<OrganBlood>,
 }
 
 impl Vasculature {
@@ -69,8 +76,8 @@ impl Vasculature {
 
     /// The vessels of a preset, such as one read from a file, with seed 0, fitted to the organ.
     pub fn from_preset(preset: Preset) -> Self {
-        let Preset { version: _, source: _, fit, tissue, roots, generator, blood: _ } = preset;
-        Self { seed: 0, generator, roots, tissue, fit }
+        let Preset { version: _, source: _, fit, tissue, roots, generator, blood } = preset;
+        Self { seed: 0, generator, roots, tissue, fit, blood }
     }
 
     /// Chooses another network.
@@ -105,8 +112,8 @@ impl Vasculature {
 /// The preset of these vessels, without the seed: for a file.
 impl From<&Vasculature> for Preset {
     fn from(vasculature: &Vasculature) -> Self {
-        let Vasculature { seed: _, generator, roots, tissue, fit } = vasculature.clone();
-        Self { fit, tissue, roots, generator, ..Self::default() }
+        let Vasculature { seed: _, generator, roots, tissue, fit, blood } = vasculature.clone();
+        Self { fit, tissue, roots, generator, blood, ..Self::default() }
     }
 }
 

@@ -21,7 +21,7 @@ use slices::{JobSlices, Place};
 use std::{
     any::Any,
     fmt,
-    panic::AssertUnwindSafe,
+    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -35,10 +35,12 @@ mod tests;
 
 pub use settings::{JobMode, JobSettings};
 
-/// The work that an organ was waiting for panicked. That organ fails; the app and all other organs go on.
+/// The work on an organ panicked, in a job or in a step of its growth. That organ fails; the app and all other organs
+/// go on, unless the app is built to abort on panics.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the work on it panicked ({message}), which is a fault of bevy_vessels; please report it with mesh and settings"
+    "the work on it panicked ({message}), which is a fault of its custom generator, if it has one, or else of \
+     bevy_vessels; please report that with mesh and settings"
 )]
 pub struct JobPanic {
     /// The message of the panic.
@@ -54,7 +56,12 @@ impl JobPanic {
 }
 
 /// The result of a job.
-type Outcome<T> = Result<T, JobPanic>;
+pub(crate) type Outcome<T> = Result<T, JobPanic>;
+
+/// Does work now. After a panic, whatever it has changed must be dropped.
+pub(crate) fn catch_panic<T>(work: impl FnOnce() -> T) -> Outcome<T> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| JobPanic::new(&*payload))
+}
 
 /// Does work until it ends or panics. A panic drops everything that the work has made.
 async fn guarded<T>(work: impl Future<Output = T>) -> Outcome<T> {

@@ -6,7 +6,8 @@ use bevy::{
 };
 use std::time::Duration;
 
-/// How work that takes longer than a frame is done: tissues, indices, networks and bindings of large organs.
+/// How work that takes longer than a frame is done: tissues, starts of growths, indices, networks and bindings of large
+/// organs.
 ///
 /// Changes apply to work that begins later; a new [`slice_time`](Self::slice_time) also to work under way.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]

@@ -1,4 +1,4 @@
-//! Scenes: presets as assets, and organs that are saved.
+//! Scenes: presets as assets, organs in the scenes of glTF files, and organs that are saved.
 
 use crate::plugin::{
     growth::GrowthPlugin,
@@ -6,22 +6,26 @@ use crate::plugin::{
 };
 use bevy::{
     app::{App, Plugin, Update},
-    asset::{AssetApp, AssetServer},
+    asset::{AssetApp, AssetServer, Assets},
     ecs::{
         intern::Interned,
         schedule::{ApplyDeferred, IntoScheduleConfigs, ScheduleLabel, common_conditions::any_with_component},
     },
+    log::warn,
 };
 
 pub(crate) mod organ_preset;
 pub(crate) mod preset_asset;
+mod scene_organs;
 
 pub use organ_preset::VesselPreset;
 pub use preset_asset::{PresetAsset, PresetLoadError, PresetLoader};
+pub use scene_organs::{SceneMeshes, VasculatureOfScene};
 
-/// Loads presets as assets, and gives organs with a [`VesselPreset`] their vessels. Adds the [`GrowthPlugin`].
+/// Loads presets as assets, and gives organs with a [`VesselPreset`] and the meshes of scenes with a
+/// [`VasculatureOfScene`] their vessels. Adds the [`GrowthPlugin`].
 ///
-/// Add it after `AssetPlugin`. Without that no presets are loaded.
+/// Add it after `AssetPlugin`, which `DefaultPlugins` contain. Otherwise no presets are loaded, with a warning.
 ///
 /// # Presets
 ///
@@ -78,6 +82,13 @@ impl Plugin for ScenePlugin {
             app.add_plugins(GrowthPlugin::default().in_schedule(self.schedule));
         }
         order::configure(app, self.schedule);
+        app.add_systems(
+            self.schedule,
+            (scene_organs::follow_scenes, ApplyDeferred)
+                .chain_ignore_deferred()
+                .before_ignore_deferred(VesselSystems::Source)
+                .run_if(any_with_component::<VasculatureOfScene>),
+        );
         if !app.world().contains_resource::<AssetServer>() {
             return;
         }
@@ -89,5 +100,12 @@ impl Plugin for ScenePlugin {
                 .before_ignore_deferred(VesselSystems::Source)
                 .run_if(any_with_component::<VesselPreset>),
         );
+    }
+
+    fn finish(&self, app: &mut App) {
+        let world = app.world();
+        if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<PresetAsset>>() {
+            warn!("no presets are loaded from files: add the vessel plugin after DefaultPlugins");
+        }
     }
 }

@@ -101,7 +101,8 @@ impl SurfacedOrganItem<'_, '_> {
 
     /// Whether the vessels don't grow at the moment.
     fn rests(&self) -> bool {
-        self.is_grown() || self.control == Some(&GrowthControl::Paused)
+        let is_settled = self.progress.is_some_and(GrowthProgress::is_settled);
+        self.is_grown() || is_settled || self.control == Some(&GrowthControl::Paused)
     }
 }
 

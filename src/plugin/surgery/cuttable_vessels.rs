@@ -47,8 +47,16 @@ use bevy::{
 /// }
 /// # let _ = slash;
 /// ```
-#[derive(Resource, Debug, Default)]
+#[derive(Resource, Debug)]
 pub struct CuttableVessels {
+    /// How many actions or strokes [`undo`](Self::undo) can take back. When there are more, the oldest become
+    /// permanent.
+    ///
+    /// Higher values take more memory: about a hundred bytes for each segment that an action changed.
+    /// [`undo_all`](Self::undo_all) needs no memory, and heals permanent ones, too.
+    ///
+    /// Limits: none; with 0 nothing can be undone, but all at once. Default: [`Self::DEFAULT_UNDO_LIMIT`].
+    pub undo_limit: usize,
     queue: Vec<VesselCommand>,
     /// Operations of this frame, still to be announced.
     done: Vec<VesselOperation>,
@@ -57,7 +65,22 @@ pub struct CuttableVessels {
     warned: Vec<Entity>,
 }
 
+impl Default for CuttableVessels {
+    fn default() -> Self {
+        Self {
+            undo_limit: Self::DEFAULT_UNDO_LIMIT,
+            queue: Vec::new(),
+            done: Vec::new(),
+            history: UndoHistory::default(),
+            warned: Vec::new(),
+        }
+    }
+}
+
 impl CuttableVessels {
+    /// Default of [`undo_limit`](Self::undo_limit).
+    pub const DEFAULT_UNDO_LIMIT: usize = 256;
+
     /// Severs every vessel that a blade crosses; a ball or capsule also removes what lies within it.
     pub fn cut(&mut self, blade: Blade) {
         self.request(VesselCommand::new(VesselAction::Cut(blade)));
@@ -132,7 +155,7 @@ impl CuttableVessels {
     }
 
     /// Undoes the last action or stroke that changed anything, on all the vessels that it changed. If several
-    /// overlapped in time, the one that began last is undone.
+    /// overlapped in time, the one that began last is undone. Actions beyond the [`undo_limit`](Self::undo_limit) stay.
     ///
     /// Blood that was lost stays lost.
     pub fn undo(&mut self) {
@@ -209,8 +232,10 @@ pub(crate) fn carry_out(
         return;
     }
     let mut queue = std::mem::take(&mut door.queue);
+    let most = door.undo_limit;
     for command in queue.drain(..).chain(commands.read().cloned()) {
         let outcome = field.carry_out(&command, &mut door.history);
+        field.limit(&mut door.history, most);
         door.done.extend(outcome.done);
         for error in outcome.errors {
             door.report_failure(&error);

@@ -1,6 +1,7 @@
 //! Surgery: vessels are cut, clamped, tied, sealed, and healed again.
 
 use crate::plugin::{
+    growth::GrowthState,
     order::{self, VesselSystems},
     vessels::{OrganVessels, VesselWounds, Vessels, VesselsPlugin},
 };
@@ -18,13 +19,14 @@ use bevy::{
 
 pub(crate) mod cuttable;
 mod cuttable_vessels;
+mod hold;
 mod ledgers;
 pub(crate) mod messages;
 pub(crate) mod open_ends;
 mod operate;
 mod undo;
 
-pub use cuttable::Cuttable;
+pub use cuttable::{Cuttable, WoundedGrowth};
 pub use cuttable_vessels::{CuttableVessels, Stroke};
 pub use messages::{
     OperationError, OperationKind, StrokeId, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed,
@@ -70,6 +72,7 @@ impl Plugin for SurgeryPlugin {
             ledgers::clear_outdated.run_if(any_with_component::<VesselWounds>),
             ledgers::follow_settings.run_if(any_match_filter::<Or<(Changed<Cuttable>, Changed<OrganVessels>)>>),
             cuttable_vessels::carry_out,
+            hold::hold_growths.run_if(any_with_component::<GrowthState>),
             (open_ends::spawn_open_ends, ApplyDeferred)
                 .chain_ignore_deferred()
                 .run_if(any_match_filter::<Changed<VesselWounds>>),

@@ -97,6 +97,15 @@ impl OperatingField<'_, '_> {
         outcome
     }
 
+    /// Makes the oldest actions permanent, so that as many entries as `most` can be undone.
+    pub(crate) fn limit(&mut self, history: &mut UndoHistory, most: usize) {
+        for (vessels, actions) in history.take_oldest(most) {
+            if let Ok(mut found) = self.vessels.get_mut(vessels) {
+                found.wounds.bypass_change_detection().ledger_mut().make_permanent(actions);
+            }
+        }
+    }
+
     fn act(&mut self, targets: &[Target], action: &VesselAction) -> Outcome {
         match action {
             VesselAction::Cut(blade) => self.cut(targets, blade),

@@ -70,6 +70,12 @@ impl UndoHistory {
         Some(taken)
     }
 
+    /// Takes the first entries, until as many as `most` are left: the number of actions of each on each vessel entity.
+    pub(crate) fn take_oldest(&mut self, most: usize) -> Vec<(Entity, usize)> {
+        let surplus = self.entries.len().saturating_sub(most);
+        self.entries.drain(..surplus).flat_map(|entry| entry.changed).collect()
+    }
+
     /// Removes vessel entities from the history.
     pub(crate) fn forget(&mut self, is_meant: impl Fn(Entity) -> bool) {
         self.entries.iter_mut().for_each(|entry| entry.changed.retain(|&(vessels, _)| !is_meant(vessels)));
@@ -121,6 +127,17 @@ mod tests {
         history.note(right, vessels(&[3]));
         assert_eq!(taken(&mut history), [(1, 5), (2, 3), (3, 1)]);
         assert_eq!(taken(&mut history), []);
+    }
+
+    #[test]
+    fn the_oldest_entries_go_first() {
+        let (mut history, stroke) = (UndoHistory::default(), Some(StrokeId::begin()));
+        (0..2).for_each(|_| history.note(stroke, vessels(&[1, 2])));
+        history.note(None, vessels(&[3]));
+        assert!(history.take_oldest(2).is_empty());
+        let oldest = history.take_oldest(1).into_iter().map(|(vessels, actions)| (vessels.index_u32(), actions));
+        assert_eq!(oldest.collect::<Vec<_>>(), [(1, 2), (2, 2)]);
+        assert_eq!(taken(&mut history), [(3, 1)]);
     }
 
     #[test]

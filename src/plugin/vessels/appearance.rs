@@ -37,7 +37,10 @@ pub enum SegmentColoring {
 #[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct VesselAppearance {
-    /// Colour of each kind of vessels.
+    /// Colour of each kind of vessels. An alpha below 1 makes them translucent, whatever their colours mean.
+    ///
+    /// Segments overlap at their joints, which shows where they are translucent. Closed meshes, of a
+    /// [`VesselSurface`](crate::plugin::VesselSurface), don't.
     ///
     /// Default: [`Self::DEFAULT_COLORS`].
     pub colors: ByKind<Color>,

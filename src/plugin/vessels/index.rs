@@ -177,6 +177,10 @@ impl IndexState {
         self.len = len;
         let is_due = len - indexed > indexed / 2 || self.idle_frames > VesselIndex::IDLE_FRAMES;
         let is_due = is_due && self.coming.is_none() && !self.has_failed;
+        if len <= self.at_once && len > indexed && self.idle_frames > VesselIndex::IDLE_FRAMES {
+            // A small tree waits for no query, either, once it has grown.
+            self.follow(vessels, log);
+        }
         if len > self.at_once && len > indexed && is_due {
             let (tree, cursor) = (vessels.tree().clone(), log.now());
             self.coming = Some(jobs.start(len, |pace| ComingIndex::of(tree, cursor, pace)));

@@ -7,6 +7,7 @@
 
 use super::{Circulation, FlowError, Network};
 use crate::synthesis::{
+    exponential::ln,
     pace::{Pace, at_once},
     units::{Flow, Resistance},
 };
@@ -26,15 +27,28 @@ impl Network {
     /// # Errors
     /// A flow that isn't above 0, or that the vessels don't let through at any resistance; the bed is as before then.
     pub fn fit_bed(&mut self, flow: Flow) -> Result<Resistance, FlowError> {
+        at_once(self.fit_bed_paced(flow, &Pace::default()))
+    }
+
+    /// The same as [paced](crate::synthesis::pace) work.
+    ///
+    /// # Errors
+    /// Those of [`fit_bed`](Self::fit_bed).
+    pub async fn fit_bed_paced(&mut self, flow: Flow, pace: &Pace) -> Result<Resistance, FlowError> {
         let before = self.settings.bed.resistance;
-        let fitted = fit(flow, self.source, |resistance| {
-            self.set_bed_resistance(Some(resistance))?;
-            Ok(self.inflow())
-        });
-        if fitted.is_err() {
+        let mut search = Search::new(flow, self.source)?;
+        while let Some(resistance) = search.trial() {
+            if let Err(error) = self.set_bed_resistance(Some(resistance)) {
+                self.set_bed_resistance(before)?;
+                return Err(error);
+            }
+            search.learn(self.inflow());
+            pace.rest(search.progress()).await;
+        }
+        if search.outcome().is_err() {
             self.set_bed_resistance(before)?;
         }
-        fitted
+        search.outcome()
     }
 
     fn set_bed_resistance(&mut self, resistance: Option<Resistance>) -> Result<(), FlowError> {
@@ -50,55 +64,105 @@ impl Circulation {
     /// # Errors
     /// As [`Network::fit_bed`], and an iteration that did not converge.
     pub fn fit_bed(&mut self, flow: Flow) -> Result<Resistance, FlowError> {
+        at_once(self.fit_bed_paced(flow, &Pace::default()))
+    }
+
+    /// The same as [paced](crate::synthesis::pace) work.
+    ///
+    /// # Errors
+    /// Those of [`fit_bed`](Self::fit_bed).
+    pub async fn fit_bed_paced(&mut self, flow: Flow, pace: &Pace) -> Result<Resistance, FlowError> {
         let before = self.bed_resistance();
-        let fitted = fit(flow, self.arterial().source, |resistance| {
-            self.set_bed_resistance(resistance)?;
-            Ok(self.arterial().inflow())
-        });
-        if fitted.is_err() {
+        let mut search = Search::new(flow, self.arterial().source)?;
+        while let Some(resistance) = search.trial() {
+            if let Err(error) = self.set_bed_resistance(resistance) {
+                self.set_bed_resistance(before)?;
+                return Err(error);
+            }
+            search.learn(self.arterial().inflow());
+            pace.rest(search.progress()).await;
+        }
+        if search.outcome().is_err() {
             self.set_bed_resistance(before)?;
         }
-        fitted
+        search.outcome()
     }
 }
 
-/// The resistance at which `inflow` gives a flow, that falls as the resistance rises. `drop` is the pressure between
-/// roots and bed.
-fn fit(
-    flow: Flow,
-    drop: f64,
-    mut inflow: impl FnMut(Resistance) -> Result<Flow, FlowError>,
-) -> Result<Resistance, FlowError> {
-    let wanted = flow.cubic_metres_per_second();
-    FlowError::check_positive("the flow into the organ in mL/min", flow.ml_per_min())?;
-    let mut at = |resistance: f64| {
-        let resistance = Resistance::from_pascal_seconds_per_cubic_metre(resistance);
-        inflow(resistance).map(Flow::cubic_metres_per_second)
-    };
-    // From above, since joined trees are harder to solve the less the bed resists. The first is far more than a bed of a
-    // million terminals needs.
-    let mut high = MOST_TERMINALS * (drop.abs() / wanted).max(f64::MIN_POSITIVE);
-    let mut low = high;
-    let mut most = at(low)?;
-    for _ in 0..STRIDES {
-        if most >= wanted {
-            break;
-        }
-        (low, high) = (low / STRIDE, low);
-        most = at(low)?;
+/// A search for the resistance that gives a flow, which falls as the resistance rises.
+struct Search {
+    /// The wanted flow, and the one at `low`, in m³/s.
+    wanted: f64,
+    most: f64,
+    /// The resistance is between these, once the flow at `low` is enough.
+    low: f64,
+    high: f64,
+    trial: Option<f64>,
+    /// Strides that are left, down from a resistance that is too high.
+    strides: u32,
+}
+
+impl Search {
+    /// From above, since joined trees are harder to solve the less the bed resists. The first trial is far more than a
+    /// bed of a million terminals needs. `drop` is the pressure between roots and bed.
+    fn new(flow: Flow, drop: f64) -> Result<Self, FlowError> {
+        let wanted = flow.cubic_metres_per_second();
+        FlowError::check_positive("the flow into the organ in mL/min", flow.ml_per_min())?;
+        let high = MOST_TERMINALS * (drop.abs() / wanted).max(f64::MIN_POSITIVE);
+        Ok(Self { wanted, most: 0.0, low: high, high, trial: Some(high), strides: STRIDES })
     }
-    if !(most >= wanted) {
-        let most = Flow::from_cubic_metres_per_second(most).ml_per_min();
-        return Err(FlowError::OutOfReach { flow: flow.ml_per_min(), nearest: most });
+
+    /// The resistance to try next; `None` at the end.
+    fn trial(&self) -> Option<Resistance> {
+        self.trial.map(Resistance::from_pascal_seconds_per_cubic_metre)
     }
-    while high > low * (1.0 + ACCURACY) {
-        let middle = (low * high).sqrt();
-        if at(middle)? < wanted {
-            high = middle;
+
+    /// Takes note of the flow at the trial, and chooses the next one.
+    fn learn(&mut self, inflow: Flow) {
+        let Some(tried) = self.trial else { return };
+        let inflow = inflow.cubic_metres_per_second();
+        if !self.has_enough() {
+            (self.low, self.most) = (tried, inflow);
+            if !self.has_enough() {
+                self.trial = (self.strides > 0).then_some(tried / STRIDE);
+                self.strides = self.strides.saturating_sub(1);
+                self.high = tried;
+                return;
+            }
+        } else if tried == self.high {
+            // The resistance that was found has been set.
+            self.trial = None;
+            return;
+        } else if inflow < self.wanted {
+            self.high = tried;
         } else {
-            low = middle;
+            self.low = tried;
         }
+        let is_found = self.high <= self.low * (1.0 + ACCURACY);
+        self.trial = Some(if is_found { self.high } else { (self.low * self.high).sqrt() });
     }
-    at(high)?;
-    Ok(Resistance::from_pascal_seconds_per_cubic_metre(high))
+
+    /// Whether the vessels let through enough at the lowest resistance so far.
+    fn has_enough(&self) -> bool {
+        self.most >= self.wanted
+    }
+
+    /// Share of the search that is done, from 0 to 1: each trial halves what is left.
+    fn progress(&self) -> f32 {
+        if !self.has_enough() {
+            return 0.0;
+        }
+        let left = (self.high / self.low - 1.0).clamp(ACCURACY, STRIDE);
+        (1.0 - ln(left / ACCURACY) / ln(STRIDE / ACCURACY)) as f32
+    }
+
+    /// The resistance, or the reason why there is none.
+    fn outcome(&self) -> Result<Resistance, FlowError> {
+        if self.has_enough() {
+            return Ok(Resistance::from_pascal_seconds_per_cubic_metre(self.high));
+        }
+        let [flow, nearest] =
+            [self.wanted, self.most].map(|flow| Flow::from_cubic_metres_per_second(flow).ml_per_min());
+        Err(FlowError::OutOfReach { flow, nearest })
+    }
 }

@@ -37,6 +37,16 @@ impl Wounds {
         report
     }
 
+    /// Makes the oldest actions permanent, or all if there are fewer: [`undo`](Self::undo) no longer reverts them, and
+    /// their previous states are forgotten. [`undo_all`](Self::undo_all) still heals them.
+    pub fn make_permanent(&mut self, actions: usize) {
+        let actions = actions.min(self.history.len());
+        let first = self.history.get(actions).map_or(self.before.len(), |action| action.before);
+        self.history.drain(..actions);
+        self.before.drain(..first);
+        self.history.iter_mut().for_each(|action| action.before -= first);
+    }
+
     /// Undoes all actions, and reports the combined changes.
     pub fn undo_all(&mut self, tree: &VesselTree) -> WoundReport {
         let mut report = WoundReport::default();

@@ -6,7 +6,7 @@ use crate::synthesis::{
     wound::{
         ClampId, EndId, Retraction, SeveredEnd, WoundError,
         crossing::{Severed, segment},
-        injury::{ClosureKind, End, Injury},
+        injury::{Closure, ClosureKind, End, Injury},
     },
 };
 use std::{collections::BTreeMap, ops::Range};
@@ -79,6 +79,13 @@ impl Wounds {
     /// Whether every segment is as it grew.
     pub fn is_empty(&self) -> bool {
         self.injuries.is_empty()
+    }
+
+    /// Whether a vessel is severed, tied off or sealed: anything but clamps, which are taken off again.
+    pub fn are_lasting(&self) -> bool {
+        let is_clamp = |closure: &Closure| matches!(closure.kind, ClosureKind::Clamp(_));
+        let is_lasting = |injury: &Injury| !injury.gaps().is_empty() || !injury.closures().iter().all(is_clamp);
+        self.injuries.values().any(is_lasting)
     }
 
     /// Number of the last action that changed anything. It only rises, even with undo and clear, so that it
