@@ -1,4 +1,4 @@
-//! A set of voxels with ranks: a list and its inverse in little more than one bit per voxel.
+//! A set of voxels, or of other numbers, with ranks: a list and its inverse in little more than one bit for each.
 
 use crate::synthesis::pace::{Pace, STRETCH};
 
@@ -12,7 +12,7 @@ pub(crate) struct BitGrid {
 impl BitGrid {
     /// A grid with the voxels that `set` returns for each of so many candidates.
     pub async fn new(len: usize, candidates: usize, set: impl Fn(usize) -> Option<usize>, pace: &Pace) -> Self {
-        let mut words = vec![0u64; len.div_ceil(64)];
+        let mut words = vec![0u64; len / 64 + 1];
         let add = |candidate: usize| {
             if let Some(voxel) = set(candidate) {
                 words[voxel / 64] |= 1 << (voxel % 64);
@@ -33,7 +33,7 @@ impl BitGrid {
         self.words[voxel / 64] >> (voxel % 64) & 1 == 1
     }
 
-    /// Number of set voxels before this one.
+    /// Number of set voxels before this one, which may be the one after the last.
     pub fn rank(&self, voxel: usize) -> usize {
         let below = self.words[voxel / 64] & ((1u64 << (voxel % 64)) - 1);
         self.ranks[voxel / 64] as usize + below.count_ones() as usize
@@ -80,6 +80,8 @@ mod tests {
             assert_eq!(bits.rank(voxel), rank);
         }
         assert!(!bits.contains(2) && !bits.contains(128));
-        assert_eq!(bits.rank(128), 5);
+        assert_eq!((bits.rank(128), bits.rank(130)), (5, 6));
+        let full = at_once(BitGrid::new(64, 64, Some, &Pace::default()));
+        assert_eq!((full.rank(64), full.iter().count()), (64, 64));
     }
 }

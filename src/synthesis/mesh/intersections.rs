@@ -41,18 +41,17 @@ pub async fn self_intersections_paced(positions: &[Vec3], triangles: &[[u32; 3]]
     pace.part(0.0..0.05).each(triangles.len(), take).await;
     let box_of = |id: usize| Bounds::around(&corners(numbers[id]));
     let boxes = BoxPairs::new_paced(numbers.len(), box_of, &pace.part(0.05..0.4)).await;
-    // In the order of the boxes, so that faces that are compared lie together.
     let order = boxes.order();
     let number = |slot: usize| numbers[order[slot] as usize];
+    // Made when they are compared: kept, they would take as much memory as all the rest.
     let face = |slot: usize| Face::new(triangles[number(slot) as usize], corners(number(slot)));
-    let faces: Vec<Face> = pace.part(0.4..0.45).collect(order.len(), face).await;
     let mut found = Vec::new();
     let compare = |a: usize, b: usize| {
-        if intersect(&faces[a], &faces[b]) {
+        if intersect(&face(a), &face(b)) {
             found.push(ascending([number(a), number(b)]));
         }
     };
-    boxes.each_paced(compare, &pace.part(0.45..0.95)).await;
+    boxes.each_paced(compare, &pace.part(0.4..0.95)).await;
     pace.part(0.95..1.0).sort(&mut found).await;
     found
 }

@@ -44,6 +44,7 @@ impl BoxPairs {
         let mut keys: Vec<(u64, u32)> = pace.part(0.1..0.2).collect(count, keyed).await;
         pace.part(0.2..0.7).sort(&mut keys).await;
         let order: Vec<u32> = pace.part(0.7..0.75).collect(count, |slot| keys[slot].1).await;
+        drop(keys);
         let mut levels = vec![pace.part(0.75..0.85).collect(count, |slot| box_of(order[slot] as usize)).await];
         let pace = pace.part(0.85..1.0);
         while let Some(below) = levels.last()

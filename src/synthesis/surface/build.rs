@@ -87,7 +87,7 @@ impl Surface {
         if settings.level > 0 && !layout.doubts.is_empty() {
             let faces_per_corner = 4u32.pow(settings.level - 1);
             let plan = Plan { trunks, curves, layout, origin, faces_per_corner };
-            let Remade { remade, left } = remake(&mut mesh, &plan, &pace.part(0.9..1.0)).await;
+            let Remade { remade, left } = remake(&mut mesh, plan, &pace.part(0.9..1.0)).await;
             (report.remade, report.left) = (remade, left);
         }
         let mut surface = Self { mesh, report };

@@ -3,7 +3,6 @@
 //! A lateral of radius r, at an angle θ to a trunk of radius R, breaks through the trunk's surface R·cot θ further along
 //! the trunk, over a length of r / sin θ to both sides, and is clear of it (R + r·|cos θ|) / sin θ from the trunk's centre
 //! line, measured along the lateral: the room of Skjermo & Eidheim 2005, equation 4.
-
 //!
 //! One that leaves so flat that this lies far away is followed along both curves to where it is clear.
 

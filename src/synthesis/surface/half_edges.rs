@@ -86,36 +86,30 @@ impl HalfEdges {
 
     /// The next subdivision.
     pub async fn refined_paced(&self, pace: &Pace) -> Self {
-        let split = self.split_paced(&pace.part(0.0..0.6)).await;
-        self.quads_of(split, &pace.part(0.6..1.0)).await
+        let split = self.split_paced(&pace.part(0.0..0.5)).await;
+        let (radii, nodes) = self.marks_of_split(&pace.part(0.5..0.6)).await;
+        let mut refined = self.quads_of(&split, &pace.part(0.6..1.0)).await;
+        refined.vertices = Vertices { positions: split.positions, radii, nodes };
+        refined
     }
 
     /// The vertices of the next subdivision.
     pub async fn split_paced(&self, pace: &Pace) -> Split {
         let (old, face_count) = (self.vertices.positions.len(), self.face_starts.len() - 1);
-        let edges = self.edge_numbers();
+        let numbers = self.edge_numbers();
         pace.rest(0.1).await;
-        let count = old + face_count + self.len() / 2;
-        let mut vertices = Vertices {
-            positions: Vec::with_capacity(count),
-            radii: Vec::with_capacity(count),
-            nodes: Vec::with_capacity(count),
-        };
-        vertices.positions.resize(old, Vec3::ZERO);
-        vertices.radii.extend_from_slice(&self.vertices.radii);
-        vertices.nodes.extend_from_slice(&self.vertices.nodes);
         let mut split = Split {
-            vertices,
+            positions: Vec::with_capacity(old + face_count + self.len() / 2),
             face_of: vec![0; self.len()],
             face_uvs: Vec::with_capacity(face_count),
-            edges,
+            edges: Edges { first: (old + face_count) as u32, numbers },
             first_face: old as u32,
-            first_edge: (old + face_count) as u32,
         };
+        split.positions.resize(old, Vec3::ZERO);
         pace.part(0.1..0.4).each(face_count, |face| self.push_face_point(face, &mut split)).await;
         let moved = pace.part(0.4..0.7).collect(old, |vertex| self.moved(vertex, &split)).await;
         pace.part(0.7..1.0).each(self.len(), |half_edge| self.push_edge_point(half_edge as u32, &mut split)).await;
-        split.vertices.positions[..old].copy_from_slice(&moved);
+        split.positions[..old].copy_from_slice(&moved);
         split
     }
 
@@ -123,17 +117,40 @@ impl HalfEdges {
     fn push_face_point(&self, face: usize, split: &mut Split) {
         let range = self.face_starts[face] as usize..self.face_starts[face + 1] as usize;
         let share = 1.0 / range.len() as f32;
-        let (mut sum, mut radius, mut uv) = (Vec3::ZERO, 0.0, Vec2::ZERO);
-        for half_edge in range.clone() {
-            let corner = self.origins[half_edge] as usize;
-            sum += self.vertices.positions[corner];
-            radius += self.vertices.radii[corner];
+        let (mut sum, mut uv) = (Vec3::ZERO, Vec2::ZERO);
+        for half_edge in range {
+            sum += self.vertices.positions[self.origins[half_edge] as usize];
             uv += self.uvs[half_edge];
             split.face_of[half_edge] = split.first_face + face as u32;
         }
-        let node = self.vertices.nodes[self.origins[range.start] as usize];
-        split.vertices.push(sum * share, radius * share, node);
+        split.positions.push(sum * share);
         split.face_uvs.push(uv * share);
+    }
+
+    /// Radii and nodes of the vertices of the next subdivision.
+    pub async fn marks_of_split(&self, pace: &Pace) -> (Vec<f32>, Vec<u32>) {
+        let Vertices { radii: old_radii, nodes: old_nodes, .. } = &self.vertices;
+        let count = old_radii.len() + self.face_count() + self.len() / 2;
+        let (mut radii, mut nodes) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        radii.extend_from_slice(old_radii);
+        nodes.extend_from_slice(old_nodes);
+        let face = |face: usize| {
+            let corners = &self.origins[self.face_starts[face] as usize..self.face_starts[face + 1] as usize];
+            let sum: f32 = corners.iter().map(|&corner| old_radii[corner as usize]).sum();
+            radii.push(sum * (1.0 / corners.len() as f32));
+            nodes.push(old_nodes[corners[0] as usize]);
+        };
+        pace.part(0.0..0.4).each(self.face_count(), face).await;
+        let edge = |half_edge: usize| {
+            let twin = self.twins[half_edge] as usize;
+            if half_edge < twin {
+                let [a, b] = [half_edge, twin].map(|half_edge| self.origins[half_edge] as usize);
+                radii.push(0.5 * (old_radii[a] + old_radii[b]));
+                nodes.push(old_nodes[a]);
+            }
+        };
+        pace.part(0.4..1.0).each(self.len(), edge).await;
+        (radii, nodes)
     }
 
     /// A number of each half-edge's edge, in the order of the edges' first half-edges.
@@ -184,20 +201,21 @@ impl HalfEdges {
         let face = |half_edge: u32| split.position(split.face_of[half_edge as usize]);
         let faces = face(half_edge) + face(twin);
         let ends = self.vertices.positions[a] + self.vertices.positions[b];
-        let radius = 0.5 * (self.vertices.radii[a] + self.vertices.radii[b]);
-        split.vertices.push(0.25 * (ends + faces), radius, self.vertices.nodes[a]);
+        split.positions.push(0.25 * (ends + faces));
     }
 
-    async fn quads_of(&self, split: Split, pace: &Pace) -> Self {
+    /// Half-edges of the next subdivision, still without vertices.
+    async fn quads_of(&self, split: &Split, pace: &Pace) -> Self {
         let count = self.len();
         let (mut origins, mut twins, mut uvs) =
             (Vec::with_capacity(4 * count), Vec::with_capacity(4 * count), Vec::with_capacity(4 * count));
-        let mut leaving = vec![NONE; split.vertices.positions.len()];
+        let mut leaving = vec![NONE; split.positions.len()];
         let quad = |half_edge: usize| {
             let half_edge = half_edge as u32;
             let (next, previous) = (self.next(half_edge), self.previous(half_edge));
             let [here, after, before] = [half_edge, next, previous].map(|half_edge| half_edge as usize);
-            let quad = [self.origins[here], split.edge(half_edge), split.face_of[here], split.edge(previous)];
+            let quad =
+                [self.origins[here], split.edges.vertex(half_edge), split.face_of[here], split.edges.vertex(previous)];
             for (corner, vertex) in (4 * half_edge..).zip(quad) {
                 if leaving[vertex as usize] == NONE {
                     leaving[vertex as usize] = corner;
@@ -216,7 +234,7 @@ impl HalfEdges {
         };
         pace.each(count, quad).await;
         let face_starts = (0..=count as u32).map(|face| 4 * face).collect();
-        Self { vertices: split.vertices, origins, uvs, twins, leaving, faces: Faces::Quads, face_starts }
+        Self { vertices: Vertices::default(), origins, uvs, twins, leaving, faces: Faces::Quads, face_starts }
     }
 
     /// The half-edge after one around its face.
@@ -240,6 +258,11 @@ impl HalfEdges {
     /// The number of faces.
     pub fn face_count(&self) -> usize {
         self.face_starts.len() - 1
+    }
+
+    /// The first half-edge of each face, and at the end their number: all that is left to know once twins are done with.
+    pub fn into_face_starts(self) -> Vec<u32> {
+        self.face_starts
     }
 
     /// The half-edges of a face.
@@ -269,27 +292,16 @@ impl HalfEdges {
 /// The vertices of the next subdivision: first the old ones, moved, then one in each face, then one on each edge.
 #[derive(Debug)]
 pub(super) struct Split {
-    pub vertices: Vertices,
+    pub positions: Vec<Vec3>,
     /// Vertex in the face of each half-edge.
     pub face_of: Vec<u32>,
-    face_uvs: Vec<Vec2>,
-    pub edges: Vec<u32>,
+    /// Texture coordinates of the vertex in each face.
+    pub face_uvs: Vec<Vec2>,
+    pub edges: Edges,
     pub first_face: u32,
-    pub first_edge: u32,
 }
 
 impl Split {
-    /// The vertex on a half-edge's edge.
-    #[inline]
-    pub fn edge(&self, half_edge: u32) -> u32 {
-        self.first_edge + self.edges[half_edge as usize]
-    }
-
-    /// Gives a half-edge another vertex than its twin.
-    pub fn set_edge(&mut self, half_edge: u32, vertex: u32) {
-        self.edges[half_edge as usize] = vertex - self.first_edge;
-    }
-
     /// Texture coordinates of the vertex in a half-edge's face.
     #[inline]
     pub fn face_uv(&self, half_edge: u32) -> Vec2 {
@@ -299,7 +311,26 @@ impl Split {
     /// Position of a vertex.
     #[inline]
     pub fn position(&self, vertex: u32) -> Vec3 {
-        self.vertices.positions[vertex as usize]
+        self.positions[vertex as usize]
+    }
+}
+
+/// The vertex on each half-edge's edge.
+#[derive(Debug)]
+pub(super) struct Edges {
+    first: u32,
+    numbers: Vec<u32>,
+}
+
+impl Edges {
+    #[inline]
+    pub fn vertex(&self, half_edge: u32) -> u32 {
+        self.first + self.numbers[half_edge as usize]
+    }
+
+    /// Gives a half-edge another vertex than its twin.
+    pub fn set(&mut self, half_edge: u32, vertex: u32) {
+        self.numbers[half_edge as usize] = vertex - self.first;
     }
 }
 

@@ -8,7 +8,7 @@
 
 use super::cage::Vertices;
 use super::direction::unit;
-use super::half_edges::{HalfEdges, Split};
+use super::half_edges::{Edges, HalfEdges, Split};
 use super::mesh::SurfaceMesh;
 use crate::synthesis::pace::Pace;
 use bevy_math::{Vec2, Vec3, ops};
@@ -17,22 +17,20 @@ use std::f32::consts::TAU;
 /// More edges than any vertex of a cage has.
 const MOST_EDGES: usize = 32;
 
-/// Makes the mesh of the next subdivision. What is no longer needed is dropped on the way, so that a large mesh needs
-/// hardly more memory than it takes itself.
+/// Makes the mesh of the next subdivision. Each array is made as late and dropped as early as can be, so that a large mesh
+/// needs hardly more memory than it takes itself.
 pub(super) async fn finish(mut half_edges: HalfEdges, origin: Vec3, pace: &Pace) -> SurfaceMesh {
-    let mut split = half_edges.split_paced(&pace.part(0.0..0.4)).await;
+    let mut split = half_edges.split_paced(&pace.part(0.0..0.35)).await;
+    half_edges.vertices.positions = Vec::new();
     let mut mesh = SurfaceMesh::default();
-    (mesh.positions, mesh.normals) = limits(&half_edges, &split, origin, &pace.part(0.4..0.7)).await;
-    (half_edges.vertices, split.vertices.positions) = (Vertices::default(), Vec::new());
-    let charts = Charts::of(&mut half_edges, &mut split, &pace.part(0.7..0.8)).await;
-    half_edges.uvs = Vec::new();
-    mesh.faces.reserve_exact(half_edges.len());
-    let quad = |half_edge: usize| mesh.faces.push(charts.quad(&half_edges, &split, half_edge as u32));
-    pace.part(0.8..0.9).each(half_edges.len(), quad).await;
-    let vertices = split.vertices;
-    drop((half_edges, split.face_of, split.edges));
+    (mesh.positions, mesh.normals) = limits(&half_edges, &split, origin, &pace.part(0.35..0.65)).await;
+    (split.positions, split.face_of) = (Vec::new(), Vec::new());
+    (mesh.radii, mesh.nodes) = half_edges.marks_of_split(&pace.part(0.65..0.7)).await;
+    half_edges.vertices = Vertices::default();
+    let charts = Charts::of(&mut half_edges, &mut split, mesh.positions.len(), &pace.part(0.7..0.8)).await;
+    let (face_starts, Split { edges, first_face, .. }) = (half_edges.into_face_starts(), split);
+    mesh.faces = charts.quads(face_starts, edges, first_face, &pace.part(0.8..0.9)).await;
     (mesh.uvs, mesh.copies) = (charts.uvs, charts.copies);
-    (mesh.radii, mesh.nodes) = (vertices.radii, vertices.nodes);
     mesh.complete();
     pace.rest(1.0).await;
     mesh
@@ -41,7 +39,7 @@ pub(super) async fn finish(mut half_edges: HalfEdges, origin: Vec3, pace: &Pace)
 /// Positions and normals of all vertices, in their order.
 async fn limits(half_edges: &HalfEdges, split: &Split, origin: Vec3, pace: &Pace) -> (Vec<Vec3>, Vec<Vec3>) {
     let limits = Limits { half_edges, split, masks: Masks::new() };
-    let count = split.vertices.positions.len();
+    let count = split.positions.len();
     let (mut positions, mut normals) = (Vec::with_capacity(count), Vec::with_capacity(count));
     let mut push = |(position, normal): (Vec3, Vec3)| {
         positions.push(origin + position);
@@ -76,7 +74,7 @@ impl Limits<'_> {
         let center = self.split.position(vertex as u32);
         let neighbour = |half_edge: u32| {
             let face = self.split.face_of[half_edge as usize];
-            [self.split.position(self.split.edge(half_edge)), self.split.position(face)]
+            [self.split.position(self.split.edges.vertex(half_edge)), self.split.position(face)]
         };
         let mut around = self.half_edges.around(vertex);
         let mut first = [[Vec3::ZERO; 2]; 4];
@@ -100,7 +98,7 @@ impl Limits<'_> {
         let neighbour = |half_edge: u32| {
             let before = if half_edge == first { range.end - 1 } else { half_edge - 1 };
             let corner = self.half_edges.origins[half_edge as usize];
-            [self.split.position(self.split.edge(before)), self.split.position(corner)]
+            [self.split.position(self.split.edges.vertex(before)), self.split.position(corner)]
         };
         if range.len() == 4 {
             let neighbours = [neighbour(first), neighbour(first + 1), neighbour(first + 2), neighbour(first + 3)];
@@ -115,7 +113,7 @@ impl Limits<'_> {
         let twin = mesh.twin(half_edge);
         let face = |half_edge: u32| split.position(split.face_of[half_edge as usize]);
         let corner = |half_edge: u32| split.position(mesh.origins[half_edge as usize]);
-        let edge = |half_edge: u32| split.position(split.edge(half_edge));
+        let edge = |half_edge: u32| split.position(split.edges.vertex(half_edge));
         let neighbours = [
             [face(half_edge), edge(mesh.previous(half_edge))],
             [corner(half_edge), edge(mesh.next(twin))],
@@ -174,7 +172,8 @@ fn fan_normal(center: Vec3, neighbours: &[Neighbour]) -> Vec3 {
     unit(sum).unwrap_or(Vec3::Z)
 }
 
-/// Weights of the limit tangents, by valence: for each place around a vertex, those of the edge's end and of the face's
+/// Weights of the limit tangents, by valence: for each place around a vertex, those of the edge's end and of the
+/// face's far corner.
 struct Masks {
     by_valence: Vec<Vec<[[f32; 2]; 2]>>,
 }
@@ -211,15 +210,14 @@ struct Charts {
 
 impl Charts {
     /// Takes the place of the half-edges' origins, and gives edges of a seam two vertices.
-    async fn of(mesh: &mut HalfEdges, split: &mut Split, pace: &Pace) -> Self {
-        let unique = split.vertices.radii.len();
+    async fn of(mesh: &mut HalfEdges, split: &mut Split, unique: usize, pace: &Pace) -> Self {
         let mut charts = Self {
             uvs: Vec::with_capacity(unique + unique / 4),
             copies: Vec::new(),
             corners: std::mem::take(&mut mesh.origins),
         };
         charts.uvs.resize(split.first_face as usize, Vec2::ZERO);
-        charts.uvs.extend((0..mesh.face_count()).map(|face| split.face_uv(mesh.face(face).start)));
+        charts.uvs.append(&mut split.face_uvs);
         let middle = |half_edge: u32| {
             let next = mesh.next(half_edge);
             0.5 * (mesh.uvs[half_edge as usize] + mesh.uvs[next as usize])
@@ -232,8 +230,8 @@ impl Charts {
             let half_edge = half_edge as u32;
             let twin = mesh.twin(half_edge);
             if twin < half_edge && middle(half_edge) != middle(twin) {
-                let copy = charts.copy(split.edge(half_edge), middle(half_edge));
-                split.set_edge(half_edge, copy);
+                let copy = charts.copy(split.edges.vertex(half_edge), middle(half_edge));
+                split.edges.set(half_edge, copy);
             }
         };
         pace.part(0.7..1.0).each(mesh.len(), edge).await;
@@ -264,10 +262,19 @@ impl Charts {
         (self.uvs.len() - 1) as u32
     }
 
-    /// The quad in the place of a half-edge.
-    #[inline]
-    fn quad(&self, mesh: &HalfEdges, split: &Split, half_edge: u32) -> [u32; 4] {
-        let here = half_edge as usize;
-        [self.corners[here], split.edge(half_edge), split.face_of[here], split.edge(mesh.previous(half_edge))]
+    /// The quads, one in the place of each half-edge, given the first half-edge of each face.
+    async fn quads(&self, face_starts: Vec<u32>, edges: Edges, first_face: u32, pace: &Pace) -> Vec<[u32; 4]> {
+        let mut quads = Vec::with_capacity(self.corners.len());
+        let add = |face: usize| {
+            let range = face_starts[face]..face_starts[face + 1];
+            let mut before = edges.vertex(range.end - 1);
+            for half_edge in range {
+                let edge = edges.vertex(half_edge);
+                quads.push([self.corners[half_edge as usize], edge, first_face + face as u32, before]);
+                before = edge;
+            }
+        };
+        pace.each(face_starts.len() - 1, add).await;
+        quads
     }
 }

@@ -4,6 +4,8 @@
 //! and texture coordinates from the tube that they lie on.
 
 use super::tubes::Cone;
+use crate::synthesis::mesh::bit_grid::BitGrid;
+use crate::synthesis::pace::Pace;
 use crate::synthesis::surface::curve::Curve;
 use crate::synthesis::surface::direction::{across, unit};
 use crate::synthesis::surface::mesh::SurfaceMesh;
@@ -91,21 +93,21 @@ impl Lines<'_> {
     }
 }
 
-/// Puts grafts in the place of faces.
-pub(super) fn insert(mesh: &mut SurfaceMesh, grafts: &[Graft], lines: Lines<'_>) {
+/// What grafts bring into a mesh. They and their lines are no longer needed then.
+pub(super) fn parts_of(grafts: Vec<Graft>, mesh: &SurfaceMesh, lines: Lines<'_>) -> Parts {
     let mut draft = Draft { old: mesh, new: Parts::default(), known: BTreeMap::new() };
     for graft in grafts {
-        draft.add(graft, lines);
+        draft.add(&graft, lines);
+        draft.new.replaced.extend(graft.faces);
     }
-    let parts = draft.new;
-    let mut goes = vec![false; mesh.faces.len()];
-    grafts.iter().flat_map(|graft| &graft.faces).for_each(|&face| goes[face as usize] = true);
-    parts.put_into(mesh, &goes);
+    draft.new
 }
 
 /// What comes into a mesh.
 #[derive(Default)]
-struct Parts {
+pub(super) struct Parts {
+    /// Numbers of the faces that go.
+    replaced: Vec<u32>,
     /// Data of new vertices.
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
@@ -205,30 +207,36 @@ impl Draft<'_> {
 impl Parts {
     /// Puts the new faces in the place of those that go, without vertices that no face has. In place, since a mesh may
     /// take most of the memory there is.
-    fn put_into(self, mesh: &mut SurfaceMesh, goes: &[bool]) {
-        let stays = self.vertices_that_stay(mesh, goes);
-        let (old_unique, new) = (mesh.unique(), self.positions.len() as u32);
-        let mut count = 0;
-        let numbers: Vec<u32> = (0..stays.len())
-            .map(|vertex| {
-                // New vertices stand between those with places of their own and their copies.
-                let number = count + if vertex < old_unique { 0 } else { new };
-                count += u32::from(stays[vertex]);
-                number
-            })
-            .collect();
-        let unique = numbers.get(old_unique).map_or(count, |&first_copy| first_copy - new) as usize;
-        keep(&mut mesh.copies, &stays[old_unique..]);
-        mesh.copies.iter_mut().for_each(|original| *original = numbers[*original as usize]);
+    pub async fn put_into(self, mesh: &mut SurfaceMesh, pace: &Pace) {
+        let replaced = |face: usize| Some(self.replaced[face] as usize);
+        let goes = BitGrid::new(mesh.faces.len(), self.replaced.len(), replaced, &pace.part(0.0..0.1)).await;
+        let stays = self.vertices_that_stay(mesh, &goes, &pace.part(0.1..0.5)).await;
+        let (old_unique, new) = (mesh.unique(), self.positions.len());
+        // New vertices stand between those with places of their own and their copies.
+        let renamed = |vertex: u32| {
+            let copies_shift = if (vertex as usize) < old_unique { 0 } else { new };
+            (stays.rank(vertex as usize) + copies_shift) as u32
+        };
+        let mut copy = old_unique..;
+        mesh.copies.retain(|_| copy.next().is_some_and(|copy| stays.contains(copy)));
+        mesh.copies.iter_mut().for_each(|original| *original = renamed(*original));
+        mesh.copies.reserve_exact(self.copies.len());
+        let unique = stays.rank(old_unique);
+        let place = Place { at: unique, copies: self.copies.len() };
         let uvs = self.uvs.into_iter().map(Option::unwrap_or_default).collect();
-        exchange(&mut mesh.positions, &stays, unique, self.positions);
-        exchange(&mut mesh.normals, &stays, unique, self.normals);
-        exchange(&mut mesh.radii, &stays, unique, self.radii);
-        exchange(&mut mesh.nodes, &stays, unique, self.nodes);
-        exchange(&mut mesh.uvs, &stays, unique, uvs);
+        exchange(&mut mesh.positions, &stays, place, self.positions);
+        pace.rest(0.6).await;
+        exchange(&mut mesh.normals, &stays, place, self.normals);
+        pace.rest(0.65).await;
+        exchange(&mut mesh.radii, &stays, place, self.radii);
+        pace.rest(0.7).await;
+        exchange(&mut mesh.nodes, &stays, place, self.nodes);
+        pace.rest(0.75).await;
+        exchange(&mut mesh.uvs, &stays, place, uvs);
+        pace.rest(0.8).await;
         let first_copy = mesh.positions.len() as u32;
         let number = |corner: Corner| match corner {
-            Corner::Old(vertex) => numbers[vertex as usize],
+            Corner::Old(vertex) => renamed(vertex),
             Corner::New(vertex) => unique as u32 + vertex,
             Corner::Copy(copy) => first_copy + copy,
         };
@@ -241,43 +249,46 @@ impl Parts {
             mesh.uvs.push(uv);
             mesh.copies.push(original as u32);
         }
-        let mut face = 0;
-        mesh.faces.retain_mut(|corners| {
-            face += 1;
-            *corners = corners.map(|vertex| numbers[vertex as usize]);
-            !goes[face - 1]
-        });
+        let mut face = 0..;
+        mesh.faces.retain(|_| face.next().is_some_and(|face| !goes.contains(face)));
+        pace.part(0.85..1.0).each(mesh.faces.len(), |face| mesh.faces[face] = mesh.faces[face].map(renamed)).await;
         mesh.faces.reserve_exact(self.triangles.len());
         mesh.faces.extend(self.triangles.iter().map(|&[a, b, c]| [number(a), number(b), number(c), number(c)]));
     }
 
     /// Which vertices faces will have: those of the faces that stay, with their originals, and those of new ones.
-    fn vertices_that_stay(&self, mesh: &SurfaceMesh, goes: &[bool]) -> Vec<bool> {
-        let mut stays = vec![false; mesh.positions.len()];
-        for (face, _) in mesh.faces.iter().zip(goes).filter(|(_, goes)| !**goes) {
-            for &vertex in face {
-                stays[vertex as usize] = true;
-                stays[mesh.original(vertex) as usize] = true;
+    async fn vertices_that_stay(&self, mesh: &SurfaceMesh, goes: &BitGrid, pace: &Pace) -> BitGrid {
+        let old = |corner: &Corner| match corner {
+            Corner::Old(vertex) => Some(*vertex as usize),
+            Corner::New(_) | Corner::Copy(_) => None,
+        };
+        let corners = self.triangles.iter().flatten().chain(self.copies.iter().map(|copy| &copy.0));
+        let kept: Vec<usize> = corners.filter_map(old).collect();
+        let of_faces = 8 * mesh.faces.len();
+        let stays = |candidate: usize| match candidate.checked_sub(of_faces) {
+            Some(kept_number) => Some(kept[kept_number]),
+            None if goes.contains(candidate / 8) => None,
+            None => {
+                let vertex = mesh.faces[candidate / 8][candidate % 4];
+                Some(if candidate % 8 < 4 { vertex } else { mesh.original(vertex) } as usize)
             }
-        }
-        for corner in self.triangles.iter().flatten().chain(self.copies.iter().map(|copy| &copy.0)) {
-            if let Corner::Old(vertex) = corner {
-                stays[*vertex as usize] = true;
-            }
-        }
-        stays
+        };
+        BitGrid::new(mesh.positions.len(), of_faces + kept.len(), stays, pace).await
     }
 }
 
-/// Keeps the values that stay, in their order.
-fn keep<T>(values: &mut Vec<T>, stays: &[bool]) {
-    let mut stays = stays.iter();
-    values.retain(|_| stays.next().is_some_and(|stays| *stays));
+/// Where new values come in.
+#[derive(Clone, Copy)]
+struct Place {
+    at: usize,
+    /// How many more will be pushed.
+    copies: usize,
 }
 
-/// Keeps the values that stay, and puts new ones at a place.
-fn exchange<T>(values: &mut Vec<T>, stays: &[bool], at: usize, new: Vec<T>) {
-    keep(values, stays);
-    values.reserve_exact(new.len());
-    values.splice(at..at, new);
+/// Keeps the values that stay, and puts new ones in their place, with room for copies.
+fn exchange<T>(values: &mut Vec<T>, stays: &BitGrid, place: Place, new: Vec<T>) {
+    let mut vertex = 0..;
+    values.retain(|_| vertex.next().is_some_and(|vertex| stays.contains(vertex)));
+    values.reserve_exact(new.len() + place.copies);
+    values.splice(place.at..place.at, new);
 }

@@ -3,6 +3,7 @@
 use super::site::Site;
 use crate::synthesis::mesh::{disjoint_sets::DisjointSets, self_intersections_paced};
 use crate::synthesis::pace::Pace;
+use crate::synthesis::surface::layout::Stretch;
 
 /// Faces of one joint that meet each other.
 #[derive(Clone, Debug, Default)]
@@ -39,17 +40,31 @@ impl Site<'_> {
         self.joined(&pairs)
     }
 
+    /// The faces in all doubtful stretches, each once, in order.
     fn doubtful_faces(&self) -> Vec<u32> {
-        let mut faces: Vec<u32> = Vec::new();
-        for doubt in &self.plan.layout.doubts {
-            let lengths = self.plan.layout.lengths(doubt.trunk);
-            let low = lengths.partition_point(|&length| length <= doubt.from).saturating_sub(1) as u32;
-            let high = lengths.partition_point(|&length| length < doubt.to).min(lengths.len() - 1) as u32;
-            faces.extend(self.faces_between(doubt.trunk, [low, high.max(low)]));
-        }
+        let mut stretches: Vec<(u32, [u32; 2])> =
+            self.plan.layout.doubts.iter().map(|doubt| self.rings_in(doubt)).collect();
+        stretches.sort_unstable();
+        // A trunk with many laterals has stretches that overlap.
+        stretches.dedup_by(|next, last| {
+            let overlaps = next.0 == last.0 && next.1[0] <= last.1[1];
+            if overlaps {
+                last.1[1] = last.1[1].max(next.1[1]);
+            }
+            overlaps
+        });
+        let faces = |(trunk, rings): (u32, [u32; 2])| self.faces_between(trunk, rings);
+        let mut faces: Vec<u32> = stretches.into_iter().flat_map(faces).collect();
         faces.sort_unstable();
-        faces.dedup();
         faces
+    }
+
+    /// The rings around a stretch, with its trunk.
+    fn rings_in(&self, stretch: &Stretch) -> (u32, [u32; 2]) {
+        let lengths = self.plan.layout.lengths(stretch.trunk);
+        let low = lengths.partition_point(|&length| length <= stretch.from).saturating_sub(1) as u32;
+        let high = lengths.partition_point(|&length| length < stretch.to).min(lengths.len() - 1) as u32;
+        (stretch.trunk, [low, high.max(low)])
     }
 
     /// Knots from pairs of faces: those that meet or share a vertex are in one.

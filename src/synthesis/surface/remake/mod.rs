@@ -40,9 +40,9 @@ pub(super) struct Remade {
     pub left: Vec<NodeId>,
 }
 
-/// Makes joints again whose faces meet.
-pub(super) async fn remake(mesh: &mut SurfaceMesh, plan: &Plan, pace: &Pace) -> Remade {
-    let site = Site::of(mesh, plan);
+/// Makes joints again whose faces meet. The plan is dropped as soon as it can be: a large one takes much memory.
+pub(super) async fn remake(mesh: &mut SurfaceMesh, plan: Plan, pace: &Pace) -> Remade {
+    let site = Site::of(mesh, &plan);
     let knots = site.knots(&pace.part(0.0..0.5)).await;
     let (grafts, left) = mend_all(&site, knots, &pace.part(0.5..0.9)).await;
     let node = |knot: &Knot| knot.faces.first().map(|&face| site.node_at(site.place_of(face)));
@@ -51,9 +51,11 @@ pub(super) async fn remake(mesh: &mut SurfaceMesh, plan: &Plan, pace: &Pace) -> 
         left: left.iter().filter_map(node).collect(),
     };
     if !grafts.is_empty() {
+        let grafts = grafts.into_iter().map(|(_, graft)| graft).collect();
         let lines = Lines { curves: &plan.curves, trunks: &plan.trunks, origin: plan.origin };
-        let grafts: Vec<Graft> = grafts.into_iter().map(|(_, graft)| graft).collect();
-        graft::insert(mesh, &grafts, lines);
+        let parts = graft::parts_of(grafts, mesh, lines);
+        drop(plan);
+        parts.put_into(mesh, &pace.part(0.9..1.0)).await;
     }
     done.remade.sort_unstable();
     done.left.sort_unstable();
