@@ -20,7 +20,7 @@
 //! Without a GPU nothing is drawn and growth goes on. With one that lacks storage buffers (WebGL 2), closed meshes are
 //! drawn and segments are not, with one warning.
 
-use crate::plugin::{SurfaceLevel, VesselAppearance, VesselMesh};
+use crate::plugin::{SurfaceLevel, VesselAppearance, VesselMaps, VesselMesh};
 use bevy::{
     asset::{AssetEventSystems, embedded_asset},
     camera::{CameraUpdateSystems, visibility::VisibilitySystems},
@@ -46,6 +46,7 @@ mod segments;
 mod stumps;
 mod surfaces;
 mod template;
+mod textures;
 mod upload;
 
 pub use buffer::SegmentBuffer;
@@ -158,6 +159,7 @@ impl Plugin for SegmentRenderPlugin {
                 ),
             );
         build_surfaces(app);
+        build_textures(app);
         build_render_app(app);
     }
 
@@ -195,6 +197,17 @@ fn build_surfaces(app: &mut App) {
                 .before(VisibilitySystems::CheckVisibility)
                 .run_if(any_with_component::<VesselMesh>),
         ),
+    );
+}
+
+/// So are textures.
+fn build_textures(app: &mut App) {
+    app.add_observer(textures::undress).add_systems(
+        PostUpdate,
+        (textures::take_bases, textures::dress_organs)
+            .chain()
+            .before(AssetEventSystems)
+            .run_if(any_with_component::<VesselMaps>),
     );
 }
 

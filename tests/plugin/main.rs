@@ -27,6 +27,7 @@ mod shared;
 mod sources;
 mod splitting;
 mod surface;
+mod texture;
 mod units;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};
