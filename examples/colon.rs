@@ -1,4 +1,5 @@
-//! Arteries and veins grow over a procedural colon, and over the mucosa inside it. Once grown, they become closed meshes.
+//! Arteries and veins grow over a procedural colon, and over the mucosa inside it. Once grown, they become closed meshes
+//! outside, and lie in the texture of the mucosa inside.
 //!
 //! Every seed gives another colon. Turn it with the left mouse button, move it with the right, zoom with the wheel.
 //!
@@ -9,7 +10,7 @@
 //! | `N` | the next seed |
 //! | `A`, `V` | arteries, veins on and off |
 //! | `C` | colour by kind, radius, age, Strahler order |
-//! | `M` | closed meshes, or segments as while they grow |
+//! | `M` | closed meshes, segments as while they grow, or vessels in the mucosa's texture |
 //! | `I` | view from inside; then ↑ and ↓ travel along the lumen |
 //!
 //! `--mesh FILE` takes your own organ (GLB, glTF, OBJ), in any unit. `--headless` draws to files instead of a window,
@@ -25,9 +26,13 @@ mod wish;
 
 use bevy::prelude::*;
 use bevy_vessels::{
-    plugin::VesselSurface,
+    plugin::{VesselSurface, VesselTexture},
     prelude::*,
-    synthesis::{mesh::ShadedMesh, organ::ColonSettings},
+    synthesis::{
+        mesh::ShadedMesh,
+        organ::ColonSettings,
+        texture::{BakeSettings, VesselLook},
+    },
 };
 use clap::Parser;
 use common::{
@@ -90,13 +95,15 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         let mut organ = assets.spawn(&mut commands, mesh.into(), args.organ.tint(Color::WHITE), place);
         organ.insert(Name::new(name));
         vessels.map(|vessels| organ.insert((vessels, VesselSurface::default())));
+        organ.id()
     };
     let outside = args.organ.vessels(Some(&colon.roots), 1.4);
     if args.organ.mode == Mode::Surface {
         spawn("colon", colon.mesh.part(colon.outer.clone()), Some(outside));
         spawn("rim", colon.mesh.part(colon.outer.end..colon.inner.start), None);
         let inside = args.organ.vessels(Some(&colon.inner_roots), 0.4).with_tissue(TissueMode::Lining);
-        spawn("mucosa", colon.mesh.part(colon.inner.clone()), Some(inside));
+        let mucosa = spawn("mucosa", colon.mesh.part(colon.inner.clone()), Some(inside));
+        commands.entity(mucosa).insert(mucosa_texture());
     } else {
         spawn("colon", colon.mesh.clone(), Some(outside));
     }
@@ -108,6 +115,13 @@ fn spawn_colon(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets,
         Shot { file: "colon_inside.png", view: lumen, field_of_view: 78.0, endoscope: true },
     ];
     Ok(())
+}
+
+/// The texture of a mucosa: fine enough for its thin vessels along the whole colon.
+fn mucosa_texture() -> VesselTexture {
+    let looks =
+        [VesselKind::Artery, VesselKind::Vein].map(|kind| (kind, VesselLook { strength: 1.0, ..VesselLook::of(kind) }));
+    VesselTexture { settings: BakeSettings { size: 4096, ..default() }, looks: looks.into(), ..default() }
 }
 
 /// The organ from a file.

@@ -96,7 +96,7 @@ use bevy::{
     ecs::schedule::ScheduleLabel,
 };
 
-/// Everything that an app with vessels needs: growth, surgery, blood, deformation, surfaces, and drawing if the app
+/// Everything that an app with vessels needs: growth, surgery, blood, deformation, surfaces, textures, and drawing if the app
 /// draws.
 ///
 /// Add it after `DefaultPlugins`. Vessels also grow in an app without a renderer. Each part is a plugin of its own: an
@@ -114,6 +114,8 @@ pub struct VesselPlugin {
     pub circulation: plugin::CirculationPlugin,
     /// How closed surfaces are made.
     pub surface: plugin::SurfacePlugin,
+    /// How vessels are painted into textures.
+    pub texture: plugin::TexturePlugin,
     /// How presets are loaded.
     pub scene: plugin::ScenePlugin,
     /// How segments are drawn: how round they are.
@@ -133,6 +135,7 @@ impl VesselPlugin {
             surgery: plugin::SurgeryPlugin::in_schedule(schedule),
             circulation: plugin::CirculationPlugin::in_schedule(schedule),
             surface: plugin::SurfacePlugin::in_schedule(schedule),
+            texture: plugin::TexturePlugin::in_schedule(schedule),
             scene: plugin::ScenePlugin::in_schedule(schedule),
             ..self
         }
@@ -148,6 +151,7 @@ impl Plugin for VesselPlugin {
             self.surgery.clone(),
             self.circulation.clone(),
             self.surface.clone(),
+            self.texture.clone(),
             self.scene.clone(),
         ));
         #[cfg(feature = "render")]

@@ -297,3 +297,26 @@ fn settings_at_their_limits_make_sound_colons() {
         assert_sound(&mesh, &format!("{settings:?}"));
     }
 }
+
+/// Texels are about as long as wide, and no triangle of the texture is turned over or lies on another's strip.
+#[test]
+fn the_texture_of_a_colon_is_not_stretched() {
+    for seed in SEEDS {
+        let mesh = colon(seed).mesh;
+        let (mut stretches, mut covered) = (Vec::new(), 0.0);
+        for corners in &mesh.triangles {
+            let [a, b, c] = corners.map(|corner| mesh.uvs[corner as usize]);
+            let [p, q, r] = corners.map(|corner| mesh.positions[corner as usize]);
+            let (s, t) = (b - a, c - a);
+            let area = s.perp_dot(t);
+            covered += 0.5 * area;
+            // Along u and along v.
+            let (across, along) = ((q - p) * t.y - (r - p) * s.y, (r - p) * s.x - (q - p) * t.x);
+            stretches.push(across.length() / along.length());
+        }
+        stretches.sort_by(f32::total_cmp);
+        let median = stretches[stretches.len() / 2];
+        assert!((0.5..2.0).contains(&median), "colon {seed}: texels are {median} times as wide as long");
+        assert!(covered.abs() > 0.85 && covered.abs() < 1.0, "colon {seed}: strips cover {covered} of the texture");
+    }
+}

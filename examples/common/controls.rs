@@ -6,13 +6,13 @@ use super::{
 };
 use bevy::{diagnostic::FrameTimeDiagnosticsPlugin, ecs::system::SystemParam, light::NotShadowCaster, prelude::*};
 use bevy_vessels::{
-    plugin::{SurfaceShown, VesselSurface},
+    plugin::{SurfaceShown, TextureShown, VesselSurface, VesselTexture},
     prelude::*,
     synthesis::tree::ByKind,
 };
 
 /// Help for the keys of [`ControlsPlugin`].
-pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours\nM  closed mesh or segments";
+pub const HELP: &str = "space  pause\n.  one step\nA V  arteries, veins\nC  colours\nM  closed mesh, segments, texture";
 
 /// An organ of the example, with or without vessels.
 #[derive(Component)]
@@ -32,7 +32,7 @@ impl Default for Organ {
 struct Shown(ByKind<bool>);
 
 /// With a window: space pauses, `.` steps, `A` and `V` toggle arteries and veins of all organs, `C` changes the meaning
-/// of colours, `M` switches between closed meshes and segments.
+/// of colours, `M` switches between closed meshes, segments and textures.
 pub struct ControlsPlugin;
 
 impl Plugin for ControlsPlugin {
@@ -106,12 +106,18 @@ fn show(keys: Res<ButtonInput<KeyCode>>, mut shown: ResMut<Shown>, mut looks: Qu
     }
 }
 
-fn switch(keys: Res<ButtonInput<KeyCode>>, mut surfaces: Query<&mut VesselSurface>) {
-    for mut surface in surfaces.iter_mut().filter(|_| keys.just_pressed(KeyCode::KeyM)) {
-        surface.shows = match surface.shows {
-            SurfaceShown::Mesh => SurfaceShown::Preview,
-            SurfaceShown::Preview => SurfaceShown::Mesh,
+fn switch(keys: Res<ButtonInput<KeyCode>>, mut organs: Query<(&mut VesselSurface, Option<&mut VesselTexture>)>) {
+    for (mut surface, texture) in organs.iter_mut().filter(|_| keys.just_pressed(KeyCode::KeyM)) {
+        let is_texture = texture.as_ref().is_some_and(|texture| texture.shows != TextureShown::Vessels);
+        let (shown, painted) = match surface.shows {
+            _ if is_texture => (SurfaceShown::Mesh, TextureShown::Vessels),
+            SurfaceShown::Mesh => (SurfaceShown::Preview, TextureShown::Vessels),
+            SurfaceShown::Preview => (SurfaceShown::Mesh, TextureShown::Texture),
         };
+        surface.shows = shown;
+        if let Some(mut texture) = texture {
+            texture.shows = painted;
+        }
     }
 }
 

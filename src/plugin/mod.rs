@@ -6,7 +6,8 @@
 //! progress in [`GrowthProgress`] and messages.
 //!
 //! Components on the organ add features beyond growth: [`Cuttable`] for surgery through [`CuttableVessels`],
-//! [`Perfusion`] for blood, [`FollowsMesh`] or [`FollowsTetrahedra`] for soft bodies, [`VesselSurface`] for closed meshes.
+//! [`Perfusion`] for blood, [`FollowsMesh`] or [`FollowsTetrahedra`] for soft bodies, [`VesselSurface`] for closed meshes,
+//! [`VesselTexture`] for vessels in the organ's texture.
 //! An organ without them has no cost from them.
 //!
 //! Each room has a plugin of its own, which may be added alone:
@@ -18,6 +19,7 @@
 //! | [`SurgeryPlugin`] | `surgery` | [`CuttableVessels`], [`VesselCommand`]s → [`VesselWounds`], [`OpenEnd`] entities |
 //! | [`CirculationPlugin`] | `circulation` | [`VesselWounds`] → flow, bleeding, supply of the tissue |
 //! | [`SurfacePlugin`] | `surface` | [`Vessels`], [`VesselWounds`] → [`VesselMesh`], files |
+//! | [`TexturePlugin`] | `texture` | [`Vessels`], organ meshes → [`VesselMaps`] |
 //! | [`ScenePlugin`] | `scene` | [`PresetAsset`]s, [`VasculatureOfScene`] → [`Vasculature`]; organs saved in scenes |
 //! | [`VesselsPlugin`] | `vessels` | what all the others need; they add it themselves |
 
@@ -32,6 +34,7 @@ mod organ;
 mod scene;
 mod surface;
 mod surgery;
+mod texture;
 mod vessels;
 
 pub use circulation::{
@@ -58,6 +61,10 @@ pub use surface::{
 pub use surgery::{
     Cuttable, CuttableVessels, OpenEnd, OpenEndEntities, OperationError, OperationKind, Stroke, StrokeId,
     SurgeryPlugin, VesselAction, VesselCommand, VesselOperation, VesselOperationFailed, VesselSite, WoundedGrowth,
+};
+pub use texture::{
+    TextureBase, TextureFailed, TexturePlugin, TextureReady, TextureShown, VesselMaps, VesselTexture,
+    VesselTextureError,
 };
 pub use vessels::{
     ChangeCursor, ChangeLog, Changes, OrganVessels, SegmentColoring, VesselAppearance, VesselIndex, VesselPicker,

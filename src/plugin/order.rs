@@ -31,6 +31,8 @@ pub enum VesselSystems {
     Circulate,
     /// Closed surfaces are made of vessels that have grown or were cut, and follow them.
     Surface,
+    /// Vessels that have grown are painted into the textures of their organs.
+    Texture,
 }
 
 /// Puts the sets of a schedule in their order. The plugin of every room calls this; repeated calls change nothing.
@@ -48,6 +50,7 @@ pub(crate) fn configure(app: &mut App, schedule: Interned<dyn ScheduleLabel>) {
             VesselSystems::Cut,
             VesselSystems::Circulate,
             VesselSystems::Surface,
+            VesselSystems::Texture,
         )
             .chain_ignore_deferred(),
     );

@@ -27,7 +27,7 @@
 //! Without a GPU nothing is drawn and growth goes on. With one that lacks storage buffers (WebGL 2), closed meshes are
 //! drawn and segments are not, with one warning.
 
-use crate::plugin::{SurfaceLevel, VesselAppearance, VesselMesh};
+use crate::plugin::{SurfaceLevel, VesselAppearance, VesselMaps, VesselMesh};
 use bevy::{
     asset::{AssetEventSystems, embedded_asset},
     camera::visibility::RenderLayers,
@@ -56,6 +56,7 @@ mod stumps;
 mod surfaces;
 mod take_over;
 mod template;
+mod textures;
 mod upload;
 
 pub use buffer::SegmentBuffer;
@@ -169,6 +170,7 @@ impl Plugin for SegmentRenderPlugin {
                 ),
             );
         build_surfaces(app);
+        build_textures(app);
         build_render_app(app);
     }
 
@@ -215,6 +217,17 @@ fn build_surfaces(app: &mut App) {
                 .before(VisibilitySystems::CheckVisibility)
                 .run_if(any_with_component::<VesselMesh>),
         ),
+    );
+}
+
+/// So are textures.
+fn build_textures(app: &mut App) {
+    app.add_observer(textures::undress).add_systems(
+        PostUpdate,
+        (textures::take_bases, textures::dress_organs)
+            .chain()
+            .before(AssetEventSystems)
+            .run_if(any_with_component::<VesselMaps>),
     );
 }
 

@@ -68,6 +68,7 @@ pub mod roots;
 pub mod segment_index;
 pub mod space;
 pub mod surface;
+pub mod texture;
 pub mod tissue;
 pub mod tree;
 pub mod units;

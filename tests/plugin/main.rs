@@ -31,6 +31,7 @@ mod sources;
 mod splitting;
 mod starting;
 mod surface;
+mod texture;
 mod undo_limit;
 mod units;
 mod warnings;

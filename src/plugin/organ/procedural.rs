@@ -1,21 +1,26 @@
 //! Procedural organs as Bevy meshes.
 
-use crate::synthesis::mesh::ShadedMesh;
+use crate::synthesis::{mesh::ShadedMesh, texture::Canvas};
 use bevy::{
     asset::RenderAssetUsages,
     mesh::{Indices, Mesh, PrimitiveTopology},
 };
 
-/// A triangle list with positions, normals, UVs and vertex colours. Both worlds keep it, so that vessels can grow on
-/// it.
+/// A triangle list with positions, normals, UVs, vertex colours, and tangents where the UVs allow it. Both worlds keep it,
+/// so that vessels can grow on it and be painted into its texture.
 impl From<ShadedMesh> for Mesh {
     fn from(organ: ShadedMesh) -> Self {
-        Self::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+        let tangents = Canvas::of_shaded(&organ).map(|canvas| canvas.tangents().to_vec());
+        let mesh = Self::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
             .with_inserted_attribute(Self::ATTRIBUTE_POSITION, organ.positions)
             .with_inserted_attribute(Self::ATTRIBUTE_NORMAL, organ.normals)
             .with_inserted_attribute(Self::ATTRIBUTE_UV_0, organ.uvs)
             .with_inserted_attribute(Self::ATTRIBUTE_COLOR, organ.colors)
-            .with_inserted_indices(Indices::U32(organ.triangles.into_iter().flatten().collect()))
+            .with_inserted_indices(Indices::U32(organ.triangles.into_iter().flatten().collect()));
+        match tangents {
+            Ok(tangents) => mesh.with_inserted_attribute(Self::ATTRIBUTE_TANGENT, tangents),
+            Err(_) => mesh,
+        }
     }
 }
 

@@ -7,8 +7,9 @@
 //! visible.
 //!
 //! The mesh is one closed surface of the topology of a sphere: from the blind end along the outside to the rim, and back
-//! along the inside. `u` runs around the tube from the mesenteric border, `v` along that way, so the chart has no
-//! overlaps. Vertices at `u` = 0 and 1, and those of the two poles, are duplicated.
+//! along the inside. In the texture, that way is cut into strips side by side: `u` runs around the tube from the
+//! mesenteric border, `v` along it. So charts don't overlap, and texels are about as long as wide. Vertices along the
+//! borders of strips, and those of the two poles, are duplicated.
 //!
 //! ```
 //! use bevy_vessels::synthesis::organ::ColonSettings;
@@ -181,16 +182,30 @@ fn sweep(wall: &Wall, rings: &[Ring], columns: usize) -> ShadedMesh {
             shared.push((first + owner) as u32);
         }
     }
-    let length = walked.last().copied().unwrap_or(1.0).max(f32::MIN_POSITIVE);
-    mesh.uvs = walked
-        .iter()
-        .flat_map(|walked| (0..row).map(move |column| Vec2::new(column as f32 / columns as f32, walked / length)))
+    let girth = TAU * wall.mean_radius(Side::Outer, 0.5 * (wall.start(Side::Outer) + wall.end));
+    let strips = Strips::of(&walked, girth);
+    let share = |column: usize| column as f32 / columns as f32;
+    mesh.uvs = (0..rings.len())
+        .flat_map(|ring| (0..row).map(move |column| (ring, column)))
+        .map(|(ring, column)| strips.uv(strips.at(ring), walked[ring], share(column)))
         .collect();
+    // A ring between two strips has its vertices once more, as the end of the strip before.
+    let mut ends = vec![None; rings.len()];
+    for (strip, &ring) in strips.starts.iter().enumerate().skip(1) {
+        ends[ring] = Some(mesh.positions.len());
+        for column in 0..row {
+            let vertex = ring * row + column;
+            mesh.positions.push(mesh.positions[vertex]);
+            mesh.colors.push(mesh.colors[vertex]);
+            mesh.uvs.push(strips.uv(strip - 1, walked[ring], share(column)));
+            shared.push(shared[vertex]);
+        }
+    }
     for ring in 0..rings.len() - 1 {
+        let (below, above) = (ring * row, ends[ring + 1].unwrap_or((ring + 1) * row));
         for column in 0..columns {
-            let corner = |ring: usize, column: usize| (ring * row + column) as u32;
-            let [a, b] = [corner(ring, column), corner(ring, column + 1)];
-            let [c, d] = [corner(ring + 1, column), corner(ring + 1, column + 1)];
+            let [a, b] = [below + column, below + column + 1].map(|vertex| vertex as u32);
+            let [c, d] = [above + column, above + column + 1].map(|vertex| vertex as u32);
             if ring + 2 < rings.len() {
                 mesh.triangles.push([a, d, c]);
             }
@@ -202,6 +217,52 @@ fn sweep(wall: &Wall, rings: &[Ring], columns: usize) -> ShadedMesh {
     // At the last pole c and d coincide, so there the triangle is a, b and that pole; it is the [a, b, d] above.
     mesh.compute_normals(&shared);
     mesh
+}
+
+/// The strips into which the way along the wall is cut in the texture.
+struct Strips {
+    /// The first ring of each strip.
+    starts: Vec<usize>,
+    /// The way along the wall at which each begins, and the whole.
+    ways: Vec<f32>,
+}
+
+impl Strips {
+    /// Width of the gap beside each strip, as a share of the texture.
+    const MARGIN: f32 = 0.004;
+
+    /// As many strips as make them together about as wide as they are long, given the way along the wall at each ring,
+    /// and how far it is around the wall.
+    fn of(walked: &[f32], girth: f32) -> Self {
+        let last = walked.len() - 1;
+        let length = walked[last].max(f32::MIN_POSITIVE);
+        let count = (length / girth).sqrt().round().clamp(1.0, 16.0);
+        let mut starts = vec![0];
+        for strip in 1..count as usize {
+            let ring = walked.partition_point(|&way| way < strip as f32 * length / count);
+            if ring > starts[strip - 1] + 1 && ring + 1 < last {
+                starts.push(ring);
+            } else {
+                break;
+            }
+        }
+        let ways = starts.iter().map(|&ring| walked[ring]).chain([length]).collect();
+        Self { starts, ways }
+    }
+
+    /// The strip that a ring begins or lies in.
+    fn at(&self, ring: usize) -> usize {
+        self.starts.partition_point(|&start| start <= ring) - 1
+    }
+
+    /// Texture coordinates of a place in a strip: a way along the wall, and a share of the way around it.
+    fn uv(&self, strip: usize, walked: f32, around: f32) -> Vec2 {
+        let longest = self.ways.windows(2).map(|ends| ends[1] - ends[0]).fold(f32::MIN_POSITIVE, f32::max);
+        let width = 1.0 / self.starts.len() as f32;
+        let u = strip as f32 * width + Self::MARGIN + (width - 2.0 * Self::MARGIN) * around;
+        let v = Self::MARGIN + (1.0 - 2.0 * Self::MARGIN) * (walked - self.ways[strip]) / longest;
+        Vec2::new(u.clamp(0.0, 1.0), v.clamp(0.0, 1.0))
+    }
 }
 
 /// Angle of a column, in radians: columns are closer at the taeniae, whose edges are the sharpest feature around the tube.
