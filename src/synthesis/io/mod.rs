@@ -35,6 +35,7 @@ mod mesh;
 mod picture;
 mod regular_file;
 mod surface;
+mod texture;
 mod tree;
 
 pub use atomic::{WriteError, remove_stale, write_atomically};
@@ -48,6 +49,9 @@ pub use surface::{
 };
 #[cfg(feature = "mesh_files")]
 pub use surface::{save_surface_glb, write_surface_glb};
+pub use texture::{save_ktx2, write_ktx2};
+#[cfg(feature = "texture_files")]
+pub use texture::{save_png, write_png};
 pub use tree::{
     CsvOptions, GxlOptions, ReadError, SwcOptions, SwcReadOptions, kind_of_swc_structure, load_swc, read_swc, save_csv,
     save_gxl, save_levels, save_swc, swc_structure, write_csv, write_gxl, write_levels, write_swc,

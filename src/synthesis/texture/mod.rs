@@ -50,12 +50,16 @@ mod mips;
 mod paint;
 mod profile;
 mod report;
+mod seams;
 mod settings;
 mod shade;
 mod srgb;
 mod tangents;
 mod texels;
+#[cfg(feature = "unwrap")]
+mod unwrap;
 mod welds;
+mod window;
 
 pub use bake::Bake;
 pub use canvas::{Canvas, CanvasAttributes};

@@ -4,11 +4,12 @@ use super::atlas::{Atlas, Tensor};
 use super::bins::Bins;
 use super::canvas::Canvas;
 use super::cones::Cones;
-use super::gauss::REACH;
+use super::gauss::SEEN;
 use super::settings::{BakeSettings, BaseImage, MapKind};
-use super::shade::{Near, Sight, SurfaceSpot};
+use super::shade::{Near, Sight, SurfaceSpot, quadratic};
 use super::srgb::Srgb;
 use super::texels::{MARGIN, Placed, TILE, TILE_TEXELS};
+use super::window::Windows;
 use crate::synthesis::space::bvh::Bounds;
 use bevy_math::{DVec2, Vec2, Vec3, Vec3A};
 use std::ops::Range;
@@ -47,11 +48,11 @@ pub(super) struct Painter<'a> {
 }
 
 /// A triangle while it is painted.
-struct Face {
-    placed: Placed,
+pub(super) struct Face {
+    pub placed: Placed,
     triangle: usize,
-    corners: [Vec3; 3],
-    smooth: [Vec3; 3],
+    pub corners: [Vec3; 3],
+    pub smooth: [Vec3; 3],
     footprints: [Tensor; 3],
 }
 
@@ -65,6 +66,7 @@ struct Scratch {
     faces: Vec<Face>,
     found: Vec<u32>,
     near: Vec<Near>,
+    in_row: Vec<Near>,
     sight: Sight,
 }
 
@@ -192,20 +194,37 @@ impl Painter<'_> {
         if scratch.found.is_empty() {
             return;
         }
-        let Scratch { owners, faces, found, near, sight, .. } = scratch;
+        let Scratch { owners, faces, found, near, in_row, sight, .. } = scratch;
         for (number, face) in faces.iter().enumerate() {
             let (region, blur) = (face.region(tile), face.blur());
             let is_near = |cone: &&u32| self.cones.cones[**cone as usize].is_near(&region);
             near.clear();
-            near.extend(found.iter().filter(is_near).map(|&cone| Near::new(self.cones, cone, face.corners[0], blur)));
+            let mut windows = None;
+            for &cone in found.iter().filter(is_near) {
+                let windows = windows.get_or_insert_with(|| Windows::of(face));
+                let (shape, start) = (&self.cones.cones[cone as usize], face.corners[0]);
+                let look = &self.cones.looks[shape.layer as usize].look;
+                if let Some((window, reach)) = windows.of_cone(shape, look, tile) {
+                    near.push(Near::new(cone, shape.start - start, reach + SEEN * blur, window));
+                }
+            }
             if near.is_empty() {
                 continue;
             }
-            for (texel, at) in texels(tile, &face.placed.region(MARGIN)) {
-                if owners[texel] == number as u32 {
-                    let weights = face.placed.weights(at);
-                    sight.look(self.cones, near, &face.spot(weights));
-                    self.write((at, weights), face, band, sight);
+            let [columns, rows] = within(tile, &face.placed.region(MARGIN));
+            for row in rows {
+                in_row.clear();
+                in_row.extend(near.iter().filter(|segment| segment.is_in_row(row as i32)).cloned());
+                if in_row.is_empty() {
+                    continue;
+                }
+                for column in columns.clone() {
+                    if owners[place(tile, column, row)] == number as u32 {
+                        let at = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
+                        let weights = face.placed.weights(at);
+                        sight.look(self.cones, in_row, column as i32, || face.spot(weights));
+                        self.write((at, weights), face, band, sight);
+                    }
                 }
             }
         }
@@ -299,18 +318,31 @@ fn own(tile: &[Range<i64>; 2], scratch: &mut Scratch) -> usize {
 
 /// The texels of a tile within a region, with their centres in the texture.
 fn texels(tile: &[Range<i64>; 2], region: &[Range<i64>; 2]) -> impl Iterator<Item = (usize, DVec2)> + use<> {
-    let meet = |axis: usize| region[axis].start.max(tile[axis].start)..region[axis].end.min(tile[axis].end);
-    let (columns, rows) = (meet(0), meet(1));
-    let (left, top) = (tile[0].start, tile[1].start);
+    let ([columns, rows], tile) = (within(tile, region), tile.clone());
     rows.flat_map(move |row| {
-        columns.clone().map(move |column| {
-            let texel = (row - top) as usize * TILE as usize + (column - left) as usize;
-            (texel, DVec2::new(column as f64 + 0.5, row as f64 + 0.5))
-        })
+        let tile = tile.clone();
+        columns
+            .clone()
+            .map(move |column| (place(&tile, column, row), DVec2::new(column as f64 + 0.5, row as f64 + 0.5)))
     })
 }
 
+/// The columns and rows of a tile within a region.
+fn within(tile: &[Range<i64>; 2], region: &[Range<i64>; 2]) -> [Range<i64>; 2] {
+    [0, 1].map(|axis| region[axis].start.max(tile[axis].start)..region[axis].end.min(tile[axis].end))
+}
+
+/// The place of a texel in its tile.
+fn place(tile: &[Range<i64>; 2], column: i64, row: i64) -> usize {
+    (row - tile[1].start) as usize * TILE as usize + (column - tile[0].start) as usize
+}
+
 impl Face {
+    /// The largest blur of its texels in a direction.
+    pub fn blur_along(&self, direction: Vec3) -> f32 {
+        self.footprints.iter().map(|tensor| quadratic(tensor, direction)).fold(0.0, f32::max).sqrt()
+    }
+
     /// The largest blur of its texels.
     fn blur(&self) -> f32 {
         self.footprints.iter().map(|[xx, yy, zz, ..]| xx + yy + zz).fold(0.0, f32::max).sqrt()
@@ -324,7 +356,7 @@ impl Face {
         // Texels beside the border lie in the triangle's plane, at most so many of them beyond.
         let beside = Bounds::around(&self.corners);
         let margin = Vec3A::splat(2.0 * MARGIN as f32 * blur);
-        let wide = Vec3A::splat(REACH * blur);
+        let wide = Vec3A::splat(SEEN * blur);
         Bounds { min: min.max(beside.min - margin) - wide, max: max.min(beside.max + margin) + wide }
     }
 
