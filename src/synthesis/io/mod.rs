@@ -1,6 +1,6 @@
 //! Files: trees are written as SWC, GXL, OBJ and CSV, and as SVG and EPS pictures, and read from SWC; closed surfaces of vessels are
-//! written as GLB, STL, PLY, OBJ and OFF; organ meshes are read from GLB, glTF and OBJ. GLB, and the reading of meshes,
-//! need the feature `mesh_files`.
+//! written as GLB, STL, PLY, OBJ and OFF, baked textures as KTX2 and PNG; organ meshes are read from GLB, glTF and OBJ. GLB,
+//! and the reading of meshes, need the feature `mesh_files`, PNG needs `texture_files`.
 //!
 //! Every format has a function that writes to any [`std::io::Write`], such as [`write_swc`], and one that writes a
 //! file, such as [`save_swc`]. Files are written whole or not at all, by [`write_atomically`].

@@ -1,17 +1,18 @@
 //! Paints the first level of all maps, tile by tile.
 
-use super::atlas::{Atlas, Tensor};
+use super::atlas::Atlas;
 use super::bins::Bins;
 use super::canvas::Canvas;
 use super::cones::Cones;
+use super::face::Face;
 use super::gauss::SEEN;
 use super::settings::{BakeSettings, BaseImage, MapKind};
-use super::shade::{Near, Sight, SurfaceSpot, quadratic};
+use super::shade::{Near, Sight};
 use super::srgb::Srgb;
-use super::texels::{MARGIN, Placed, TILE, TILE_TEXELS};
+use super::texels::{MARGIN, TILE, TILE_TEXELS};
 use super::window::Windows;
 use crate::synthesis::space::bvh::Bounds;
-use bevy_math::{DVec2, Vec2, Vec3, Vec3A};
+use bevy_math::{DVec2, Vec2, Vec3};
 use std::ops::Range;
 
 /// Coverage of a texel beyond the border of a chart: its values are known, and it counts for nothing.
@@ -45,15 +46,6 @@ pub(super) struct Painter<'a> {
     pub cones: &'a Cones,
     pub settings: &'a BakeSettings,
     pub base: Option<&'a BaseImage>,
-}
-
-/// A triangle while it is painted.
-pub(super) struct Face {
-    pub placed: Placed,
-    triangle: usize,
-    pub corners: [Vec3; 3],
-    pub smooth: [Vec3; 3],
-    footprints: [Tensor; 3],
 }
 
 /// Memory for one tile after the other.
@@ -119,27 +111,17 @@ impl Painter<'_> {
         let range = |tile: usize| i64::from(tile as u32 * TILE)..i64::from(((tile as u32 + 1) * TILE).min(size));
         let tile = [range(column), range(band.row)];
         scratch.faces.clear();
-        scratch.faces.extend(entries.iter().map(|&entry| self.face(entry)));
+        scratch.faces.extend(
+            entries
+                .iter()
+                .map(|&entry| Face::of(self.canvas, self.atlas, &self.atlas.placements[entry as usize], size)),
+        );
         scratch.owners.clear();
         scratch.owners.resize(TILE_TEXELS, NOBODY);
         band.overlaps += own(&tile, scratch);
         self.own_margin(entries, &tile, scratch);
         self.cover(&tile, band, scratch);
         self.paint(&tile, band, scratch);
-    }
-
-    fn face(&self, entry: u32) -> Face {
-        let placement = &self.atlas.placements[entry as usize];
-        let triangle = placement.triangle as usize;
-        let vertices = self.canvas.mesh.triangles()[triangle].map(|vertex| vertex as usize);
-        let scale = 1.0 / (self.settings.size as f32 * self.settings.size as f32);
-        Face {
-            placed: Placed::of(self.canvas, placement, self.settings.size),
-            triangle,
-            corners: self.canvas.mesh.corners(triangle),
-            smooth: vertices.map(|vertex| self.atlas.smooth[vertex]),
-            footprints: vertices.map(|vertex| self.atlas.footprints[vertex].map(|value| value * scale)),
-        }
     }
 
     /// Gives texels beside the borders of charts to the nearest triangle.
@@ -335,47 +317,6 @@ fn within(tile: &[Range<i64>; 2], region: &[Range<i64>; 2]) -> [Range<i64>; 2] {
 /// The place of a texel in its tile.
 fn place(tile: &[Range<i64>; 2], column: i64, row: i64) -> usize {
     (row - tile[1].start) as usize * TILE as usize + (column - tile[0].start) as usize
-}
-
-impl Face {
-    /// The largest blur of its texels in a direction.
-    pub fn blur_along(&self, direction: Vec3) -> f32 {
-        self.footprints.iter().map(|tensor| quadratic(tensor, direction)).fold(0.0, f32::max).sqrt()
-    }
-
-    /// The largest blur of its texels.
-    fn blur(&self) -> f32 {
-        self.footprints.iter().map(|[xx, yy, zz, ..]| xx + yy + zz).fold(0.0, f32::max).sqrt()
-    }
-
-    /// A box around its points in a tile, widened by what their blur reaches.
-    fn region(&self, tile: &[Range<i64>; 2]) -> Bounds {
-        let corners = self.placed.part(tile.clone()).map(|at| self.at(self.placed.weights(at)) + self.corners[0]);
-        let Bounds { min, max } = Bounds::around(&corners);
-        let blur = self.blur();
-        // Texels beside the border lie in the triangle's plane, at most so many of them beyond.
-        let beside = Bounds::around(&self.corners);
-        let margin = Vec3A::splat(2.0 * MARGIN as f32 * blur);
-        let wide = Vec3A::splat(SEEN * blur);
-        Bounds { min: min.max(beside.min - margin) - wide, max: max.min(beside.max + margin) + wide }
-    }
-
-    /// A point by the weights of the corners, from the first corner.
-    fn at(&self, weights: Vec3) -> Vec3 {
-        let [a, b, c] = self.corners;
-        (b - a) * weights.y + (c - a) * weights.z
-    }
-
-    fn spot(&self, weights: Vec3) -> SurfaceSpot {
-        let [x, y, z] = weights.to_array();
-        let [a, b, c] = &self.smooth;
-        let [ta, tb, tc] = &self.footprints;
-        SurfaceSpot {
-            at: self.at(weights),
-            normal: (*a * x + *b * y + *c * z).normalize_or(*a),
-            footprint: std::array::from_fn(|k| ta[k] * x + tb[k] * y + tc[k] * z),
-        }
-    }
 }
 
 impl BaseImage {

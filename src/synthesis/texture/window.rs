@@ -1,9 +1,9 @@
 //! The texels of a triangle from which a segment can be seen.
 
 use super::cones::Cone;
+use super::face::Face;
 use super::gauss::SEEN;
 use super::look::VesselLook;
-use super::paint::Face;
 use bevy_math::Vec3;
 use std::f32::consts::PI;
 use std::ops::Range;
