@@ -40,11 +40,13 @@ pub fn cube() -> TriangleMesh {
         for row in 0..=CELLS {
             for column in 0..=CELLS {
                 let share = Vec2::new(column as f32, row as f32) / CELLS as f32;
-                positions.push(0.5 * out + (share.x - 0.5) * right + (share.y - 0.5) * up);
+                // The same to the last bit on both sides of an edge.
+                let place = |cell: u32| (cell as f32 - 0.5 * CELLS as f32) / CELLS as f32;
+                positions.push(0.5 * out + place(column) * right + place(row) * up);
                 let (place, size) = (Vec2::new((side % 3) as f32 / 3.0, 0.5 * (side / 3) as f32), 0.29);
                 let turned = match side {
                     1 => Vec2::new(1.0 - share.x, share.y),
-                    3 => 0.83 * share.yx(),
+                    3 => 0.83 * Vec2::new(share.y, share.x),
                     4 => Vec2::from_angle(0.3).rotate(share - 0.5) * 0.7 + 0.5,
                     _ => share,
                 };

@@ -155,7 +155,7 @@ async fn add(cones: &mut Vec<Cone>, number: u32, Layer { tree, look }: &Layer<'_
         let along = tree.segment_vector(node);
         let max_depth = if look.max_depth > 0.0 { look.max_depth } else { VesselLook::AUTOMATIC_DEPTH * widest };
         let chord = VesselLook::CHORD_DEPTH * along.length();
-        let blur = look.blur_at(widest, max_depth + look.depth * widest);
+        let blur = look.with_mound(look.blur_at(widest, max_depth + look.depth * widest), widest);
         let reach = widest + SEEN * blur;
         cones.push(Cone {
             start: tree.positions()[parent],

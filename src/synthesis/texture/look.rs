@@ -133,6 +133,18 @@ impl VesselLook {
         self.blur * radius + spread.min((Self::MOST_SPREAD - self.blur).max(0.0) * radius)
     }
 
+    /// Blur of the height in radii, besides that of the vessel: it makes a mound of a plateau.
+    pub(super) const MOUND: f32 = 0.5;
+
+    /// Standard deviation of the wider one of colour and height, for that of the colour.
+    pub(super) fn with_mound(&self, sigma: f32, radius: f32) -> f32 {
+        if self.bump == 0.0 {
+            return sigma;
+        }
+        let mound = Self::MOUND * radius;
+        (sigma * sigma + mound * mound).sqrt()
+    }
+
     /// Checks all settings.
     ///
     /// # Errors

@@ -16,8 +16,6 @@ use std::ops::Range;
 const UPRIGHT: f32 = 1.0e-8;
 /// Least blur, in radii: an edge too sharp for any texel.
 const SHARPEST: f32 = 1.0e-3;
-/// Blur of the height in radii, besides that of the vessel: it makes a mound of a plateau.
-const MOUND: f32 = 0.5;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug)]
@@ -209,7 +207,7 @@ impl Meeting {
         let own_blur = look.blur_at(radius, depth);
         let variance = quadratic(&spot.footprint, across).max(0.0) + own_blur * own_blur;
         let sigma = variance.sqrt().max(SHARPEST * radius);
-        if distance > radius + SEEN * sigma {
+        if distance > radius + SEEN * look.with_mound(sigma, radius) {
             return None;
         }
         let depth_along = -2.0 * depth * look.depth * cone.widening / (limit * limit) * not_above;
@@ -258,7 +256,7 @@ impl Meeting {
         if bump == 0.0 {
             return (0.0, Vec3::ZERO);
         }
-        let (r, mound) = (self.radius, MOUND * self.radius);
+        let (r, mound) = (self.radius, VesselLook::MOUND * self.radius);
         let sigma = (self.sigma * self.sigma + mound * mound).sqrt();
         let covered = across(gauss, self.distance, r, sigma);
         let scale = bump * self.visible;
@@ -266,7 +264,7 @@ impl Meeting {
         let toward = if self.distance > 0.0 { self.offset / self.distance } else { Vec3::ZERO };
         let mut slope = toward * (-scale * r * covered.by_distance);
         if self.free > 0.0 && self.free < 1.0 && self.length_squared > 0.0 {
-            let blur_by_radius = (self.widening_blur * self.own_blur + MOUND * mound) / sigma;
+            let blur_by_radius = (self.widening_blur * self.own_blur + VesselLook::MOUND * mound) / sigma;
             let by_radius = covered.value + r * (covered.by_radius + covered.by_sigma * blur_by_radius);
             let by_share = scale * by_radius * cone.widening + bump * self.visible_along * r * covered.value;
             slope += self.along * (by_share / self.length_squared);

@@ -72,7 +72,7 @@ impl Windows {
         }
         let widest = cone.start_radius.max(cone.start_radius + cone.widening);
         let depth = (high.min(limit) - cone.chord).max(0.0) + look.depth * widest;
-        let reach = widest + SEEN * look.blur_at(widest, depth);
+        let reach = widest + SEEN * look.with_mound(look.blur_at(widest, depth), widest);
         let moved = reach + self.tilt * high.abs().max(low.abs()).min(limit);
         let window = [0, 1].map(|axis| {
             let start = self.at_origin[axis] + self.slopes[axis].dot(cone.start - self.origin);
