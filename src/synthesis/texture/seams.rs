@@ -19,7 +19,7 @@ use bevy_math::{DVec2, Mat3, Vec3};
 /// Points for a texel along an edge.
 const DENSITY: f64 = 2.0;
 /// Most sweeps over all points.
-const MOST_SWEEPS: usize = 600;
+const MOST_SWEEPS: usize = 60;
 /// Largest step, in shares of the range of values, that is left.
 const SMALL: f32 = 0.1 / 255.0;
 /// Step that counts as none.
