@@ -1,5 +1,6 @@
 //! The growth of organs from the command's options.
 
+mod bake;
 mod batch;
 mod edit;
 mod flow;
@@ -10,6 +11,7 @@ mod organ;
 mod report;
 mod summary;
 
+use bake::Painting;
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     colonization::ColonizationSettings,
@@ -89,6 +91,8 @@ struct Job {
     surface: Option<SurfaceSettings>,
     /// Whether they are measured.
     mesh_figures: bool,
+    /// What textures are made, if any are wanted.
+    painting: Option<Painting>,
 }
 
 /// Grows the requested organs, and reports on `stdout` and in files. Returns figures of all organs together.
@@ -159,7 +163,9 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
     for warning in generator.validate().map_err(Failure::usage)? {
         eprintln!("generate: warning: {warning}");
     }
-    let run = Run::new(options, (&preset, &preset_name), &generator, (&*tissue, mesh.as_deref()))?;
+    let painting = Painting::new(options, mesh.as_deref())?;
+    let described = painting.as_ref().map(Painting::described);
+    let run = Run::new(options, (&preset, &preset_name), &generator, (&*tissue, mesh.as_deref()), described)?;
     if let Some(folder) = &options.out {
         prepare_folder(folder)?;
         run.claim(folder)?;
@@ -182,6 +188,7 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
         obj_sides: options.obj_sides,
         surface,
         mesh_figures: options.mesh || options.json,
+        painting,
     })
 }
 

@@ -34,12 +34,14 @@ pub struct Run {
 }
 
 impl Run {
-    /// The run of a command. `generator` is as it grows, fitted to the tissue, which is made of `mesh` if of any.
+    /// The run of a command. `generator` is as it grows, fitted to the tissue, which is made of `mesh` if of any. `textures`
+    /// describes those that are made.
     pub fn new(
         options: &Options,
         (preset, preset_name): (&Preset, &str),
         generator: &Generator,
         (tissue, mesh): (&dyn Tissue, Option<&TriangleMesh>),
+        textures: Option<String>,
     ) -> Result<Self, Failure> {
         let mode = mode_of(&preset.tissue);
         let mut facts = vec![format!("tissue: {}, {}", options.tissue.display(), described(tissue, mesh))];
@@ -54,6 +56,7 @@ impl Run {
         if options.flow {
             facts.push("tables: with the flow".to_owned());
         }
+        facts.extend(textures);
         let mut record = format!("// {} {}\n", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"));
         // Escaped, so that a path stays in its line.
         facts.iter().for_each(|fact| record.push_str(&format!("// {}\n", fact.escape_debug())));

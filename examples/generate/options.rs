@@ -1,5 +1,6 @@
 //! The command's options.
 
+use super::bake::{Map, MapFormat};
 use bevy_vessels::synthesis::{
     generator::Generator, io::ObjOptions, preset::PresetName, surface::SurfaceSettings, tissue::TissueMode,
     units::Scale,
@@ -90,6 +91,16 @@ pub struct Options {
     /// Sides of the closed meshes around the widest vessels, before subdivision: 4, 8, 16, 32 or 64.
     #[arg(long, default_value_t = SurfaceSettings::DEFAULT_MOST_SIDES, value_name = "N")]
     pub mesh_sides: u32,
+    /// Bakes the vessels into textures of the organ's mesh, so many texels wide: a power of two from 16 to 8192. A mesh
+    /// without usable texture coordinates is unwrapped, and written with those that it gets.
+    #[arg(long, value_name = "SIZE")]
+    pub bake: Option<u32>,
+    /// The textures to bake.
+    #[arg(long, value_delimiter = ',', default_value = "albedo,normal", value_name = "MAP", requires = "bake")]
+    pub maps: Vec<Map>,
+    /// Format of the textures.
+    #[arg(long, default_value = "png", requires = "bake")]
+    pub map_format: MapFormat,
     /// Prints one line of JSON per organ, with the figures of its closed meshes if these are made.
     #[arg(long)]
     pub json: bool,

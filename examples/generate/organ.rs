@@ -95,6 +95,7 @@ impl<'a> Grower<'a> {
             hash: format!("{hash:016x}"),
             kinds: KindMeasures::of(growth, &*self.job.tissue, &mut self.samples, &measured, &flows),
             cco: CcoFigures::of(growth),
+            bake: None,
             files: Vec::new(),
         };
         let millimetres = (growth as &dyn Any).downcast_ref::<Cco>().map_or(1.0, Cco::millimetres);
@@ -169,6 +170,13 @@ fn written(job: &Job, seed: u64) -> Option<Outcome> {
     if !has_figures || !targets.iter().all(|target| target.path.is_file()) {
         return None;
     }
+    let maps: Vec<PathBuf> = job.painting.iter().flat_map(|painting| painting.files(job, seed)).collect();
+    if job.painting.is_some() != line.bake.is_some() || !maps.iter().all(|path| path.is_file()) {
+        return None;
+    }
+    if let Some(bake) = &mut line.bake {
+        bake.files = maps.iter().map(|path| path.display().to_string()).collect();
+    }
     let files = targets.iter().map(|target| target.path.display().to_string()).collect();
     let before = std::mem::replace(&mut line.files, files);
     let json = if before == line.files { text.trim_end().to_owned() } else { line.json() };
@@ -195,6 +203,13 @@ impl Written<'_> {
         for target in targets(self.job, self.seed, &kinds) {
             self.write_one(&target).map_err(Failure::run)?;
             line.files.push(target.path.display().to_string());
+        }
+        if let Some(painting) = &self.job.painting {
+            let (bake, mut figures) = painting.bake(self.trees).map_err(Failure::run)?;
+            let files = painting.files(self.job, self.seed);
+            painting.save(&bake, &files).map_err(Failure::run)?;
+            figures.files = files.iter().map(|path| path.display().to_string()).collect();
+            line.bake = Some(figures);
         }
         match report_path(self.job, self.seed) {
             Some(path) => write_atomically(path, |out| writeln!(out, "{}", line.json())).map_err(Failure::run),

@@ -1,5 +1,6 @@
 //! The report of an organ.
 
+use super::bake::BakeFigures;
 use super::mesh::{MeshFigures, Meshed};
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
@@ -69,7 +70,10 @@ pub struct Line {
     /// Constrained constructive optimisation, if that is the method.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cco: Option<CcoFigures>,
-    /// Written files.
+    /// Textures, if any are made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bake: Option<BakeFigures>,
+    /// Other written files.
     pub files: Vec<String>,
 }
 

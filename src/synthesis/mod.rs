@@ -9,6 +9,7 @@
 //!    or [`cco`] adds terminal after terminal, each where the tree stays smallest.
 //! 4. The [`tree`]s are measured, checked, drawn through [`instances`] and written by [`io`].
 //! 5. [`haemodynamics`] computes blood flow, [`wound`] cuts vessels, [`binding`] moves them with a deforming organ.
+//! 6. [`surface`] makes closed meshes of vessels, [`texture`] bakes them into maps of the organ's mesh.
 //!
 //! Besides these, [`preset`] names settings with their source, [`organ`] makes procedural organs, [`random`] provides
 //! random streams, [`space`] finds points and boxes by position, and [`units`] turn lengths into metres.

@@ -1,5 +1,6 @@
 //! The batch command: the same organ for any split of the work, whole files, clear errors.
 
+mod bake;
 #[path = "../../examples/generate/command.rs"]
 mod command;
 mod mesh;

@@ -23,6 +23,8 @@ const PURE_CRATES: &[&str] = &[
     "ron",
     "gltf",
     "earcut",
+    "uvunwrap",
+    "image",
 ];
 
 /// Modules of std that the pure half must not use: clocks, threads, the environment, the network.

@@ -1,6 +1,6 @@
 //! Files: trees are written as SWC, GXL, OBJ and CSV, and as SVG and EPS pictures, and read from SWC; closed surfaces of vessels are
-//! written as GLB, STL, PLY, OBJ and OFF; organ meshes are read from GLB, glTF and OBJ. GLB, and the reading of meshes,
-//! need the feature `mesh_files`.
+//! written as GLB, STL, PLY, OBJ and OFF, baked textures as KTX2 and PNG; organ meshes are read from GLB, glTF and OBJ. GLB,
+//! and the reading of meshes, need the feature `mesh_files`, PNG needs `texture_files`.
 //!
 //! Every format has a function that writes to any [`std::io::Write`], such as [`write_swc`], and one that writes a
 //! file, such as [`save_swc`]. Files are written whole or not at all, by [`write_atomically`].
@@ -35,6 +35,7 @@ mod mesh;
 mod picture;
 mod regular_file;
 mod surface;
+mod texture;
 mod tree;
 
 pub use atomic::{WriteError, remove_stale, write_atomically};
@@ -48,6 +49,9 @@ pub use surface::{
 };
 #[cfg(feature = "mesh_files")]
 pub use surface::{save_surface_glb, write_surface_glb};
+pub use texture::{save_ktx2, write_ktx2};
+#[cfg(feature = "texture_files")]
+pub use texture::{save_png, write_png};
 pub use tree::{
     CsvOptions, GxlOptions, ReadError, SwcOptions, SwcReadOptions, kind_of_swc_structure, load_swc, read_swc, save_csv,
     save_gxl, save_levels, save_swc, swc_structure, write_csv, write_gxl, write_levels, write_swc,

@@ -25,8 +25,7 @@ pub(super) struct Placement {
 /// An edge that two charts share, or one chart with itself, with the two corners of each side's triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Seam {
-    /// Triangle and first corner on either side. The second corner follows it on the first side, and precedes it on the
-    /// other if the triangles have the same orientation.
+    /// Triangle and first corner on either side; the second corner is the next.
     pub sides: [[u32; 2]; 2],
 }
 
@@ -304,18 +303,21 @@ fn repeats(canvas: &Canvas, placements: &[Placement], seams: &[Seam]) -> [bool; 
 }
 
 impl Seam {
-    /// Texture coordinates of both ends of the edge on either side, in the same order.
-    pub fn ends(&self, canvas: &Canvas) -> [[Vec2; 2]; 2] {
-        let triangles = canvas.mesh.triangles();
+    /// The vertices of both ends of the edge on either side, in the same order.
+    pub fn vertices(&self, canvas: &Canvas) -> [[usize; 2]; 2] {
         let side = |[triangle, corner]: [u32; 2]| {
-            let corners = triangles[triangle as usize];
-            [corners[corner as usize], corners[(corner as usize + 1) % 3]]
+            let corners = canvas.mesh.triangles()[triangle as usize];
+            [corners[corner as usize], corners[(corner as usize + 1) % 3]].map(|vertex| vertex as usize)
         };
         let [one, mut other] = self.sides.map(side);
-        let position = |vertex: u32| canvas.welds.position[vertex as usize];
-        if position(one[0]) != position(other[0]) {
+        if canvas.welds.position[one[0]] != canvas.welds.position[other[0]] {
             other.swap(0, 1);
         }
-        [one, other].map(|side| side.map(|vertex| canvas.uvs[vertex as usize]))
+        [one, other]
+    }
+
+    /// Their texture coordinates.
+    pub fn ends(&self, canvas: &Canvas) -> [[Vec2; 2]; 2] {
+        self.vertices(canvas).map(|side| side.map(|vertex| canvas.uvs[vertex]))
     }
 }

@@ -10,6 +10,7 @@ use super::maps::{BakedMap, Level};
 use super::mips::halved;
 use super::paint::{BESIDE, Band, Painter, blank};
 use super::report::BakeReport;
+use super::seams;
 use super::settings::{BakeSettings, BaseImage, MapKind, Maps};
 use super::texels::TILE;
 use crate::synthesis::{
@@ -78,7 +79,7 @@ impl Bake {
             report.warnings.push(BakeWarning::FlatUvs { triangles: canvas.flat_uvs });
         }
         report.warnings.extend(thin_vessels(&cones, &atlas, settings.size));
-        let maps = levels(level, &atlas, settings, &pace.part(0.7..1.0)).await;
+        let maps = levels(level, (canvas, &atlas), settings, &pace.part(0.7..1.0)).await;
         pace.rest(1.0).await;
         Ok(Self { maps, report })
     }
@@ -128,8 +129,13 @@ async fn paint(painter: &Painter<'_>, pace: &Pace) -> (Level, usize) {
     (level, overlaps)
 }
 
-/// Fills the gutters of all levels, and takes the maps that were asked for from them.
-async fn levels(mut level: Level, atlas: &Atlas, settings: &BakeSettings, pace: &Pace) -> Vec<BakedMap> {
+/// Makes the smaller levels. Fills the gutters of all, closes their seams, and takes the maps that were asked for.
+async fn levels(
+    mut level: Level,
+    (canvas, atlas): (&Canvas, &Atlas),
+    settings: &BakeSettings,
+    pace: &Pace,
+) -> Vec<BakedMap> {
     let kinds = MapKind::ALL.into_iter().filter(|&kind| settings.maps.has(kind));
     let mut maps: Vec<BakedMap> =
         kinds.map(|kind| BakedMap { kind, size: settings.size, levels: Vec::new() }).collect();
@@ -140,7 +146,8 @@ async fn levels(mut level: Level, atlas: &Atlas, settings: &BakeSettings, pace: 
         done += 0.75 * (1.0 - done);
         let next = (level.size > 1).then(|| halved(&level));
         pace.rest(0.2).await;
-        gutter::fill(&mut level, atlas.repeats, &pace.part(0.2..0.9)).await;
+        gutter::fill(&mut level, atlas.repeats, &pace.part(0.2..0.5)).await;
+        seams::close(&mut level, canvas, &atlas.seams, atlas.repeats, &pace.part(0.5..1.0)).await;
         for map in &mut maps {
             map.levels.extend(level.maps[map.kind as usize].take());
         }

@@ -1,6 +1,7 @@
 //! The mesh that vessels are painted on.
 
 use super::error::BakeError;
+use super::limits::MOST_UV;
 use super::tangents::tangents;
 use super::welds::Welds;
 use crate::synthesis::{
@@ -9,8 +10,6 @@ use crate::synthesis::{
 };
 use bevy_math::{Vec2, Vec3, Vec4};
 
-/// Largest absolute texture coordinate. Texels are placed to a hundredth of their size up to it.
-pub(super) const MOST_UV: f32 = 16.0;
 /// Most textures that a triangle may span.
 const MOST_SPAN: f32 = 2.0;
 /// Largest share of the surface that may be without texels.

@@ -1,7 +1,7 @@
 //! The segments of all networks as they are baked: round cones with their look, found by place.
 
 use super::error::BakeError;
-use super::gauss::REACH;
+use super::gauss::SEEN;
 use super::look::VesselLook;
 use super::settings::BakeSettings;
 use crate::synthesis::{
@@ -42,6 +42,10 @@ pub(super) struct Cone {
     pub node: u32,
     /// Distance from the axis up to which it can be seen, besides the blur of the texels.
     pub reach: f32,
+    /// Depth, and height above the surface, at which it is no longer seen.
+    pub max_depth: f32,
+    /// Distance from the surface that doesn't count as depth.
+    pub chord: f32,
     /// Distance from a point of the surface up to which it can be seen, in the same way.
     far: f32,
 }
@@ -63,7 +67,8 @@ impl Cone {
 #[derive(Clone, Debug)]
 pub(super) struct Look {
     pub look: VesselLook,
-    pub max_depth: f32,
+    /// The greatest depth that one of its vessels can be seen at.
+    pub deepest: f32,
 }
 
 /// All segments, those of the first network first, and in the order of their nodes.
@@ -95,12 +100,11 @@ impl Cones {
             if settings.maps.id && layer.tree.len() > 1 << 24 {
                 return Err(BakeError::TooManyNodes { layer: number, nodes: layer.tree.len() });
             }
-            let widest = layer.tree.widest_radius();
-            let max_depth =
-                if layer.look.max_depth > 0.0 { layer.look.max_depth } else { VesselLook::AUTOMATIC_DEPTH * widest };
-            looks.push(Look { look: layer.look.clone(), max_depth });
             let shares = number as f32 / layers.len() as f32..(number + 1) as f32 / layers.len() as f32;
-            add(&mut cones, number as u32, layer.tree, &looks[number], &pace.part(0.0..0.6).part(shares)).await;
+            let before = cones.len();
+            add(&mut cones, number as u32, layer, &pace.part(0.0..0.6).part(shares)).await;
+            let deepest = cones[before..].iter().map(|cone: &Cone| cone.max_depth).fold(0.0, f32::max);
+            looks.push(Look { look: layer.look.clone(), deepest });
         }
         let boxes = BoxTree::new_paced(cones.len(), |cone| cones[cone].bounds(), &pace.part(0.6..1.0)).await;
         let bumps = |sign: f32| {
@@ -115,7 +119,7 @@ impl Cones {
         let median = |widths: &mut [f32]| *widths.select_nth_unstable_by(middle, f32::total_cmp).1;
         let median_width = if widths.is_empty() { 0.0 } else { median(&mut widths) };
         let (highest, deepest) =
-            ([-bumps(-1.0), bumps(1.0)], looks.iter().map(|look| look.max_depth).fold(0.0, f32::max));
+            ([-bumps(-1.0), bumps(1.0)], looks.iter().map(|look| look.deepest).fold(0.0, f32::max));
         Ok(Self { cones, looks, boxes, highest, deepest, median_width })
     }
 
@@ -134,7 +138,7 @@ impl Cones {
 }
 
 /// Appends the segments of a tree.
-async fn add(cones: &mut Vec<Cone>, layer: u32, tree: &VesselTree, Look { look, max_depth }: &Look, pace: &Pace) {
+async fn add(cones: &mut Vec<Cone>, number: u32, Layer { tree, look }: &Layer<'_>, pace: &Pace) {
     let (to_tip, to_root) = distances(tree, look.fade);
     let counts = tree.child_counts();
     let thinnest = tree.radii().iter().copied().filter(|radius| *radius > 0.0).fold(f32::INFINITY, f32::min);
@@ -148,22 +152,26 @@ async fn add(cones: &mut Vec<Cone>, layer: u32, tree: &VesselTree, Look { look, 
         let parent = parent as usize;
         let start_radius = start_radius(tree, node);
         let widest = start_radius.max(radius);
-        // As deep as it can be seen at all: the scatter doesn't grow beyond.
-        let blur = look.blur * widest + look.scatter * (max_depth + look.depth * widest);
-        let reach = widest + REACH * blur;
+        let along = tree.segment_vector(node);
+        let max_depth = if look.max_depth > 0.0 { look.max_depth } else { VesselLook::AUTOMATIC_DEPTH * widest };
+        let chord = VesselLook::CHORD_DEPTH * along.length();
+        let blur = look.with_mound(look.blur_at(widest, max_depth + look.depth * widest), widest);
+        let reach = widest + SEEN * blur;
         cones.push(Cone {
             start: tree.positions()[parent],
-            along: tree.segment_vector(node),
+            along,
             start_radius,
             widening: radius - start_radius,
             shade: [start_radius, radius].map(shade),
             to_tip: to_tip[node],
             to_root: [to_root[parent], to_root[node]],
             is_end: [look.fade == 0.0 && tree.parents()[parent] == NO_PARENT, look.fade == 0.0 && counts[node] == 0],
-            layer,
+            layer: number,
             node: node as u32,
             reach,
-            far: (reach * reach + max_depth * max_depth).sqrt(),
+            max_depth,
+            chord,
+            far: (reach * reach + (max_depth + chord) * (max_depth + chord)).sqrt(),
         });
     };
     pace.each(tree.len(), segment).await;

@@ -1,5 +1,6 @@
 //! Why nothing can be baked, and what is not as good as it could be.
 
+use super::limits::{LEAST_SIZE, MOST_LAYERS, MOST_SIZE, MOST_UV};
 use crate::synthesis::mesh::MeshError;
 
 /// Why there are no textures.
@@ -17,7 +18,7 @@ pub enum BakeError {
     },
     /// A size that is no power of two, or out of its limits.
     #[error("a texture cannot be {size} texels wide; set a power of two from {least} to {most}",
-        least = super::BakeSettings::LEAST_SIZE, most = super::BakeSettings::MOST_SIZE)]
+        least = LEAST_SIZE, most = MOST_SIZE)]
     Size {
         /// The size given.
         size: u32,
@@ -26,7 +27,7 @@ pub enum BakeError {
     #[error("no map is asked for; set one of them in maps")]
     NoMaps,
     /// More networks than the map of vessels can number.
-    #[error("{layers} networks are too many for one texture; give at most {most}", most = super::BakeSettings::MOST_LAYERS)]
+    #[error("{layers} networks are too many for one texture; give at most {most}", most = MOST_LAYERS)]
     TooManyLayers {
         /// Their number.
         layers: usize,
@@ -75,7 +76,7 @@ pub enum BakeError {
     NoUvs,
     /// A texture coordinate that is not finite, or far outside.
     #[error("vertex {vertex} has texture coordinates ({u}, {v}); they must be finite and within ±{most}: unwrap the mesh anew",
-        most = super::canvas::MOST_UV)]
+        most = MOST_UV)]
     BadUv {
         /// The first such vertex.
         vertex: usize,

@@ -37,14 +37,15 @@ pub struct VesselLook {
     ///
     /// Units: radii. Limits: 0 to 4. Default: [`Self::DEFAULT_BLUR`].
     pub blur: f32,
-    /// How much the standard deviation of the blur grows with depth, as tissue scatters light.
+    /// How much the standard deviation of the blur grows with depth, as tissue scatters light; up to
+    /// [`Self::MOST_SPREAD`] radii, where a vessel has lost half of its contrast.
     ///
     /// Units: lengths per length of depth. Limits: 0 to 4. Default: [`Self::DEFAULT_SCATTER`].
     pub scatter: f32,
     /// Depth at which vessels are no longer seen. They fade on the way there. As far above the surface they are not
-    /// taken as belonging to it.
+    /// taken as belonging to it. A distance within [`Self::CHORD_DEPTH`] of a segment's length counts as none.
     ///
-    /// Units: tissue lengths. Limits: at least 0; 0 stands for [`Self::AUTOMATIC_DEPTH`] radii of the widest vessel.
+    /// Units: tissue lengths. Limits: at least 0; 0 stands for [`Self::AUTOMATIC_DEPTH`] radii of each segment.
     /// Default: 0.
     pub max_depth: f32,
     /// Height to which a vessel at the surface raises it. It falls with depth, as the strength does.
@@ -70,8 +71,13 @@ impl VesselLook {
     pub const DEFAULT_BLUR: f32 = 0.25;
     /// A third of the depth: the order of a path length of red light in tissue.
     pub const DEFAULT_SCATTER: f32 = 0.35;
-    /// Depth in radii of the widest vessel at which nothing is seen any more, if [`max_depth`](Self::max_depth) is 0.
+    /// Radii in the depth at which a segment is no longer seen, if [`max_depth`](Self::max_depth) is 0.
     pub const AUTOMATIC_DEPTH: f32 = 4.0;
+    /// Share of a segment's length by which it may lie off the surface that it was grown on: the height of an arc over a
+    /// chord as long as 1.4 radii of the arc.
+    pub const CHORD_DEPTH: f32 = 0.2;
+    /// Radii at which scatter ends to blur.
+    pub const MOST_SPREAD: f32 = 1.5;
     /// A slight relief: vessels lie in the wall, not on it.
     pub const DEFAULT_BUMP: f32 = 0.15;
     /// A wet surface.
@@ -119,6 +125,24 @@ impl VesselLook {
                 ..base
             },
         }
+    }
+
+    /// Standard deviation of the blur of a vessel of some radius at some depth.
+    pub(super) fn blur_at(&self, radius: f32, depth: f32) -> f32 {
+        let spread = self.scatter * depth;
+        self.blur * radius + spread.min((Self::MOST_SPREAD - self.blur).max(0.0) * radius)
+    }
+
+    /// Blur of the height in radii, besides that of the vessel: it makes a mound of a plateau.
+    pub(super) const MOUND: f32 = 0.5;
+
+    /// Standard deviation of the wider one of colour and height, for that of the colour.
+    pub(super) fn with_mound(&self, sigma: f32, radius: f32) -> f32 {
+        if self.bump == 0.0 {
+            return sigma;
+        }
+        let mound = Self::MOUND * radius;
+        (sigma * sigma + mound * mound).sqrt()
     }
 
     /// Checks all settings.

@@ -42,20 +42,26 @@ mod bins;
 mod canvas;
 mod cones;
 mod error;
+mod face;
 mod gauss;
 mod gutter;
+mod limits;
 mod look;
 mod maps;
 mod mips;
 mod paint;
 mod profile;
 mod report;
+mod seams;
 mod settings;
 mod shade;
 mod srgb;
 mod tangents;
 mod texels;
+#[cfg(feature = "unwrap")]
+mod unwrap;
 mod welds;
+mod window;
 
 pub use bake::Bake;
 pub use canvas::{Canvas, CanvasAttributes};

@@ -1,16 +1,18 @@
 //! Paints the first level of all maps, tile by tile.
 
-use super::atlas::{Atlas, Tensor};
+use super::atlas::Atlas;
 use super::bins::Bins;
 use super::canvas::Canvas;
 use super::cones::Cones;
-use super::gauss::REACH;
+use super::face::Face;
+use super::gauss::SEEN;
 use super::settings::{BakeSettings, BaseImage, MapKind};
-use super::shade::{Near, Sight, SurfaceSpot};
+use super::shade::{Near, Sight};
 use super::srgb::Srgb;
-use super::texels::{MARGIN, Placed, TILE, TILE_TEXELS};
+use super::texels::{MARGIN, TILE, TILE_TEXELS};
+use super::window::Windows;
 use crate::synthesis::space::bvh::Bounds;
-use bevy_math::{DVec2, Vec2, Vec3, Vec3A};
+use bevy_math::{DVec2, Vec2, Vec3};
 use std::ops::Range;
 
 /// Coverage of a texel beyond the border of a chart: its values are known, and it counts for nothing.
@@ -46,15 +48,6 @@ pub(super) struct Painter<'a> {
     pub base: Option<&'a BaseImage>,
 }
 
-/// A triangle while it is painted.
-struct Face {
-    placed: Placed,
-    triangle: usize,
-    corners: [Vec3; 3],
-    smooth: [Vec3; 3],
-    footprints: [Tensor; 3],
-}
-
 /// Memory for one tile after the other.
 #[derive(Default)]
 struct Scratch {
@@ -65,6 +58,7 @@ struct Scratch {
     faces: Vec<Face>,
     found: Vec<u32>,
     near: Vec<Near>,
+    in_row: Vec<Near>,
     sight: Sight,
 }
 
@@ -117,27 +111,17 @@ impl Painter<'_> {
         let range = |tile: usize| i64::from(tile as u32 * TILE)..i64::from(((tile as u32 + 1) * TILE).min(size));
         let tile = [range(column), range(band.row)];
         scratch.faces.clear();
-        scratch.faces.extend(entries.iter().map(|&entry| self.face(entry)));
+        scratch.faces.extend(
+            entries
+                .iter()
+                .map(|&entry| Face::of(self.canvas, self.atlas, &self.atlas.placements[entry as usize], size)),
+        );
         scratch.owners.clear();
         scratch.owners.resize(TILE_TEXELS, NOBODY);
         band.overlaps += own(&tile, scratch);
         self.own_margin(entries, &tile, scratch);
         self.cover(&tile, band, scratch);
         self.paint(&tile, band, scratch);
-    }
-
-    fn face(&self, entry: u32) -> Face {
-        let placement = &self.atlas.placements[entry as usize];
-        let triangle = placement.triangle as usize;
-        let vertices = self.canvas.mesh.triangles()[triangle].map(|vertex| vertex as usize);
-        let scale = 1.0 / (self.settings.size as f32 * self.settings.size as f32);
-        Face {
-            placed: Placed::of(self.canvas, placement, self.settings.size),
-            triangle,
-            corners: self.canvas.mesh.corners(triangle),
-            smooth: vertices.map(|vertex| self.atlas.smooth[vertex]),
-            footprints: vertices.map(|vertex| self.atlas.footprints[vertex].map(|value| value * scale)),
-        }
     }
 
     /// Gives texels beside the borders of charts to the nearest triangle.
@@ -192,20 +176,37 @@ impl Painter<'_> {
         if scratch.found.is_empty() {
             return;
         }
-        let Scratch { owners, faces, found, near, sight, .. } = scratch;
+        let Scratch { owners, faces, found, near, in_row, sight, .. } = scratch;
         for (number, face) in faces.iter().enumerate() {
             let (region, blur) = (face.region(tile), face.blur());
             let is_near = |cone: &&u32| self.cones.cones[**cone as usize].is_near(&region);
             near.clear();
-            near.extend(found.iter().filter(is_near).map(|&cone| Near::new(self.cones, cone, face.corners[0], blur)));
+            let mut windows = None;
+            for &cone in found.iter().filter(is_near) {
+                let windows = windows.get_or_insert_with(|| Windows::of(face));
+                let (shape, start) = (&self.cones.cones[cone as usize], face.corners[0]);
+                let look = &self.cones.looks[shape.layer as usize].look;
+                if let Some((window, reach)) = windows.of_cone(shape, look, tile) {
+                    near.push(Near::new(cone, shape.start - start, reach + SEEN * blur, window));
+                }
+            }
             if near.is_empty() {
                 continue;
             }
-            for (texel, at) in texels(tile, &face.placed.region(MARGIN)) {
-                if owners[texel] == number as u32 {
-                    let weights = face.placed.weights(at);
-                    sight.look(self.cones, near, &face.spot(weights));
-                    self.write((at, weights), face, band, sight);
+            let [columns, rows] = within(tile, &face.placed.region(MARGIN));
+            for row in rows {
+                in_row.clear();
+                in_row.extend(near.iter().filter(|segment| segment.is_in_row(row as i32)).cloned());
+                if in_row.is_empty() {
+                    continue;
+                }
+                for column in columns.clone() {
+                    if owners[place(tile, column, row)] == number as u32 {
+                        let at = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
+                        let weights = face.placed.weights(at);
+                        sight.look(self.cones, in_row, column as i32, || face.spot(weights));
+                        self.write((at, weights), face, band, sight);
+                    }
                 }
             }
         }
@@ -299,51 +300,23 @@ fn own(tile: &[Range<i64>; 2], scratch: &mut Scratch) -> usize {
 
 /// The texels of a tile within a region, with their centres in the texture.
 fn texels(tile: &[Range<i64>; 2], region: &[Range<i64>; 2]) -> impl Iterator<Item = (usize, DVec2)> + use<> {
-    let meet = |axis: usize| region[axis].start.max(tile[axis].start)..region[axis].end.min(tile[axis].end);
-    let (columns, rows) = (meet(0), meet(1));
-    let (left, top) = (tile[0].start, tile[1].start);
+    let ([columns, rows], tile) = (within(tile, region), tile.clone());
     rows.flat_map(move |row| {
-        columns.clone().map(move |column| {
-            let texel = (row - top) as usize * TILE as usize + (column - left) as usize;
-            (texel, DVec2::new(column as f64 + 0.5, row as f64 + 0.5))
-        })
+        let tile = tile.clone();
+        columns
+            .clone()
+            .map(move |column| (place(&tile, column, row), DVec2::new(column as f64 + 0.5, row as f64 + 0.5)))
     })
 }
 
-impl Face {
-    /// The largest blur of its texels.
-    fn blur(&self) -> f32 {
-        self.footprints.iter().map(|[xx, yy, zz, ..]| xx + yy + zz).fold(0.0, f32::max).sqrt()
-    }
+/// The columns and rows of a tile within a region.
+fn within(tile: &[Range<i64>; 2], region: &[Range<i64>; 2]) -> [Range<i64>; 2] {
+    [0, 1].map(|axis| region[axis].start.max(tile[axis].start)..region[axis].end.min(tile[axis].end))
+}
 
-    /// A box around its points in a tile, widened by what their blur reaches.
-    fn region(&self, tile: &[Range<i64>; 2]) -> Bounds {
-        let corners = self.placed.part(tile.clone()).map(|at| self.at(self.placed.weights(at)) + self.corners[0]);
-        let Bounds { min, max } = Bounds::around(&corners);
-        let blur = self.blur();
-        // Texels beside the border lie in the triangle's plane, at most so many of them beyond.
-        let beside = Bounds::around(&self.corners);
-        let margin = Vec3A::splat(2.0 * MARGIN as f32 * blur);
-        let wide = Vec3A::splat(REACH * blur);
-        Bounds { min: min.max(beside.min - margin) - wide, max: max.min(beside.max + margin) + wide }
-    }
-
-    /// A point by the weights of the corners, from the first corner.
-    fn at(&self, weights: Vec3) -> Vec3 {
-        let [a, b, c] = self.corners;
-        (b - a) * weights.y + (c - a) * weights.z
-    }
-
-    fn spot(&self, weights: Vec3) -> SurfaceSpot {
-        let [x, y, z] = weights.to_array();
-        let [a, b, c] = &self.smooth;
-        let [ta, tb, tc] = &self.footprints;
-        SurfaceSpot {
-            at: self.at(weights),
-            normal: (*a * x + *b * y + *c * z).normalize_or(*a),
-            footprint: std::array::from_fn(|k| ta[k] * x + tb[k] * y + tc[k] * z),
-        }
-    }
+/// The place of a texel in its tile.
+fn place(tile: &[Range<i64>; 2], column: i64, row: i64) -> usize {
+    (row - tile[1].start) as usize * TILE as usize + (column - tile[0].start) as usize
 }
 
 impl BaseImage {

@@ -4,7 +4,7 @@
 //! Φ((r − d)/σ) − Φ((−r − d)/σ): the convolution of its round profile with a Gaussian, across. Near a tip the rounded
 //! end is convolved along the axis as well.
 
-use super::gauss::{Gauss, REACH};
+use super::gauss::{Gauss, SEEN};
 
 /// Nodes and weights of Gauss–Legendre integration with eight points on [−1, 1] (Abramowitz & Stegun, table 25.4).
 const LEGENDRE: [(f32, f32); 4] = [
@@ -43,11 +43,11 @@ pub(super) fn across(gauss: &Gauss, d: f32, r: f32, sigma: f32) -> Coverage {
 /// The part of the coverage that the end of a vessel takes away, at the distance `y` from its axis and `x` beyond the
 /// end along it: the vessel without an end, less the half before the end, less the rounded end itself.
 pub(super) fn beyond_end(gauss: &Gauss, (x, y): (f32, f32), r: f32, sigma: f32) -> f32 {
-    if x < -REACH * sigma {
+    if x < -(SEEN + 1.0) * sigma {
         return 0.0;
     }
     let strip = |half_width: f32| gauss.below((half_width - y) / sigma) - gauss.below((-half_width - y) / sigma);
-    let (from, to) = ((x - REACH * sigma).max(0.0), (x + REACH * sigma).min(r));
+    let (from, to) = ((x - (SEEN + 1.0) * sigma).max(0.0), (x + (SEEN + 1.0) * sigma).min(r));
     let mut rounded = 0.0;
     if from < to {
         let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));

@@ -1,6 +1,7 @@
 //! What a user chooses of a bake.
 
 use super::error::BakeError;
+use super::limits;
 
 /// What is baked, how large, and over what.
 #[derive(Clone, Debug, PartialEq)]
@@ -128,11 +129,11 @@ impl FromIterator<MapKind> for Maps {
 
 impl BakeSettings {
     /// Smallest texture.
-    pub const LEAST_SIZE: u32 = 16;
+    pub const LEAST_SIZE: u32 = limits::LEAST_SIZE;
     /// Largest texture that all GPUs of a desktop take.
-    pub const MOST_SIZE: u32 = 8192;
+    pub const MOST_SIZE: u32 = limits::MOST_SIZE;
     /// The most networks in one texture.
-    pub const MOST_LAYERS: usize = 254;
+    pub const MOST_LAYERS: usize = limits::MOST_LAYERS;
     /// A texture of an organ that fills the screen.
     pub const DEFAULT_SIZE: u32 = 2048;
     /// Salmon, (220, 150, 125) in sRGB: mucosa in white light.

@@ -6,16 +6,16 @@
 
 use super::atlas::Tensor;
 use super::cones::{Cone, Cones};
-use super::gauss::{Gauss, REACH};
+use super::gauss::{Gauss, SEEN};
+use super::look::VesselLook;
 use super::profile::{across, beyond_end};
 use bevy_math::Vec3;
+use std::ops::Range;
 
 /// Share of a segment's length, squared, below which its projection is a point: it runs along the normal.
 const UPRIGHT: f32 = 1.0e-8;
 /// Least blur, in radii: an edge too sharp for any texel.
 const SHARPEST: f32 = 1.0e-3;
-/// Blur of the height in radii, besides that of the vessel: it makes a mound of a plateau.
-const MOUND: f32 = 0.5;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug)]
@@ -28,20 +28,27 @@ pub(super) struct SurfaceSpot {
 }
 
 /// A segment near some points, with its start from their origin.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Near {
     pub cone: u32,
     start: Vec3,
     /// Square of the distance from the axis up to which it is seen.
     reach_squared: f32,
+    /// Columns and rows of texels from which it can be seen.
+    columns: Range<i32>,
+    rows: Range<i32>,
 }
 
 impl Near {
-    /// A segment, for points with an origin and with texels whose blur is at most `blur`.
-    pub fn new(cones: &Cones, cone: u32, origin: Vec3, blur: f32) -> Self {
-        let Cone { start, reach, .. } = cones.cones[cone as usize];
-        let reach = reach + REACH * blur;
-        Self { cone, start: start - origin, reach_squared: reach * reach }
+    /// A segment with its start from some origin, in a window of texels from which it is seen within `reach` of its axis.
+    pub fn new(cone: u32, start: Vec3, reach: f32, [columns, rows]: [Range<i64>; 2]) -> Self {
+        let [columns, rows] = [columns, rows].map(|range| range.start as i32..range.end as i32);
+        Self { cone, start, reach_squared: reach * reach, columns, rows }
+    }
+
+    /// Whether it can be seen from a row of texels.
+    pub fn is_in_row(&self, row: i32) -> bool {
+        self.rows.contains(&row)
     }
 }
 
@@ -71,14 +78,18 @@ pub(super) struct Sight {
 }
 
 impl Sight {
-    /// Looks at a point. `near` are the segments in reach, by rising number.
-    pub fn look(&mut self, cones: &Cones, near: &[Near], spot: &SurfaceSpot) {
+    /// Looks at a point of a column of texels. `near` are the segments in reach of its row, by rising number.
+    pub fn look(&mut self, cones: &Cones, near: &[Near], column: i32, spot: impl FnOnce() -> SurfaceSpot) {
         self.seen.clear();
         (self.height, self.slope, self.covering) = (0.0, Vec3::ZERO, None);
-        let (gauss, mut layer, mut top) = (Gauss::table(), u32::MAX, f32::INFINITY);
+        let mut near = near.iter().filter(|segment| segment.columns.contains(&column)).peekable();
+        if near.peek().is_none() {
+            return;
+        }
+        let (spot, gauss, mut layer, mut top) = (spot(), Gauss::table(), u32::MAX, f32::INFINITY);
         for segment in near {
             let cone = &cones.cones[segment.cone as usize];
-            let Some(meeting) = Meeting::of(segment, cone, cones, spot) else { continue };
+            let Some(meeting) = Meeting::of(segment, cone, cones, &spot) else { continue };
             let look = &cones.looks[cone.layer as usize].look;
             let (height, slope) = meeting.height(gauss, cone, look.bump);
             if height.abs() > self.height.abs() {
@@ -100,8 +111,8 @@ impl Sight {
             match self.seen.last_mut().filter(|_| layer == cone.layer) {
                 Some(best) if best.alpha >= alpha => {}
                 best => {
-                    let limit = cones.looks[cone.layer as usize].max_depth;
-                    let deep = (meeting.depth / limit).clamp(0.0, 1.0);
+                    let deepest = cones.looks[cone.layer as usize].deepest;
+                    let deep = (meeting.depth / deepest).clamp(0.0, 1.0);
                     seen.color = std::array::from_fn(|channel| {
                         let [thin, wide] = [look.thin_color[channel], look.wide_color[channel]];
                         let color = thin + (wide - thin) * meeting.shade;
@@ -168,8 +179,9 @@ impl Meeting {
         if squared > near.reach_squared {
             return None;
         }
-        let look = &cones.looks[cone.layer as usize];
-        let (below, limit, look) = (-(up + rise * share), look.max_depth, &look.look);
+        let (below, limit, look) = (-(up + rise * share), cone.max_depth, &cones.looks[cone.layer as usize].look);
+        // A straight segment leaves a curved surface.
+        let below = below.signum() * (below.abs() - cone.chord).max(0.0);
         if !(below.abs() < limit) {
             return None;
         }
@@ -186,9 +198,18 @@ impl Meeting {
         }
         let distance = squared.sqrt();
         let across = if distance > 0.0 { offset / distance } else { spot.normal.cross(along).normalize_or_zero() };
-        let widening_blur = look.blur + look.scatter * look.depth;
-        let own_blur = look.blur * radius + look.scatter * depth;
+        let spread = if look.scatter * depth < VesselLook::MOST_SPREAD * radius - look.blur * radius {
+            look.scatter * look.depth
+        } else {
+            (VesselLook::MOST_SPREAD - look.blur).max(0.0)
+        };
+        let widening_blur = look.blur + spread;
+        let own_blur = look.blur_at(radius, depth);
         let variance = quadratic(&spot.footprint, across).max(0.0) + own_blur * own_blur;
+        let sigma = variance.sqrt().max(SHARPEST * radius);
+        if distance > radius + SEEN * look.with_mound(sigma, radius) {
+            return None;
+        }
         let depth_along = -2.0 * depth * look.depth * cone.widening / (limit * limit) * not_above;
         Some(Self {
             free: if is_upright { share } else { free },
@@ -199,7 +220,7 @@ impl Meeting {
             length_squared,
             radius,
             depth,
-            sigma: variance.sqrt().max(SHARPEST * radius),
+            sigma,
             widening_blur,
             own_blur,
             visible,
@@ -235,7 +256,7 @@ impl Meeting {
         if bump == 0.0 {
             return (0.0, Vec3::ZERO);
         }
-        let (r, mound) = (self.radius, MOUND * self.radius);
+        let (r, mound) = (self.radius, VesselLook::MOUND * self.radius);
         let sigma = (self.sigma * self.sigma + mound * mound).sqrt();
         let covered = across(gauss, self.distance, r, sigma);
         let scale = bump * self.visible;
@@ -243,7 +264,7 @@ impl Meeting {
         let toward = if self.distance > 0.0 { self.offset / self.distance } else { Vec3::ZERO };
         let mut slope = toward * (-scale * r * covered.by_distance);
         if self.free > 0.0 && self.free < 1.0 && self.length_squared > 0.0 {
-            let blur_by_radius = (self.widening_blur * self.own_blur + MOUND * mound) / sigma;
+            let blur_by_radius = (self.widening_blur * self.own_blur + VesselLook::MOUND * mound) / sigma;
             let by_radius = covered.value + r * (covered.by_radius + covered.by_sigma * blur_by_radius);
             let by_share = scale * by_radius * cone.widening + bump * self.visible_along * r * covered.value;
             slope += self.along * (by_share / self.length_squared);
@@ -269,6 +290,6 @@ fn fade(cone: &Cone, share: f32) -> (f32, f32) {
 }
 
 /// A symmetric tensor's value in a direction.
-fn quadratic([xx, yy, zz, xy, xz, yz]: &Tensor, v: Vec3) -> f32 {
+pub(super) fn quadratic([xx, yy, zz, xy, xz, yz]: &Tensor, v: Vec3) -> f32 {
     v.x * (xx * v.x + 2.0 * (xy * v.y + xz * v.z)) + v.y * (yy * v.y + 2.0 * yz * v.z) + zz * v.z * v.z
 }
