@@ -48,7 +48,7 @@ impl Space {
 
     /// Whether a segment is long enough for its radius, or at least as long as before.
     pub(super) fn is_long_enough(&self, segment: u32, before: f64) -> bool {
-        let length = self.forest.node(segment).length;
+        let length = self.forest.length(segment);
         length >= LEAST_LENGTH * self.radius(segment) || length >= before
     }
 
@@ -56,7 +56,7 @@ impl Space {
     fn fit(&mut self, tree: u32) -> bool {
         let root = self.root_segment(tree);
         let radius = self.radius(root);
-        if radius * self.forest.node(root).strain <= 1.0 {
+        if radius * f64::from(self.forest.node(root).strain) <= 1.0 {
             return true;
         }
         let (mut wide, mut stack) = (std::mem::take(&mut self.wide), std::mem::take(&mut self.stack));
@@ -65,7 +65,7 @@ impl Space {
         stack.push((root, radius));
         while let Some((segment, radius)) = stack.pop() {
             let node = self.forest.node(segment);
-            if radius * node.strain <= 1.0 {
+            if radius * f64::from(node.strain) <= 1.0 {
                 continue;
             }
             if radius > f64::from(node.bound) {
@@ -111,7 +111,7 @@ impl Space {
             let node = self.forest.node(other);
             let sum = bound + f64::from(node.bound);
             // Most are too far away, which one of their ends shows.
-            let reach = half + node.length + sum;
+            let reach = half + f64::from(node.reach) + sum;
             if middle.distance_squared(node.at.as_dvec3()) >= reach * reach {
                 return true;
             }

@@ -12,6 +12,8 @@ use std::sync::Arc;
 /// Excess of depth, as a share of what is needed, at which a segment that is traced counts as inside. It is the least
 /// step of the trace, too.
 const MARGIN: f64 = 0.01;
+/// Steps along the tissue's diagonal in which what cannot tell distances is asked whether it forbids a vessel.
+const STEPS: f64 = 512.0;
 
 /// A tissue with a border.
 #[derive(Clone, Debug)]
@@ -118,12 +120,8 @@ impl Domain {
     /// Whether a point lies so deep in the tissue, and is not forbidden.
     pub(super) fn holds_point(&self, point: DVec3, radius: f64) -> bool {
         let need = radius + self.border;
-        self.depth_bounds(point, need)[0] >= need && !self.is_forbidden(point)
-    }
-
-    /// Whether a node may not be at a point.
-    pub(super) fn is_forbidden(&self, point: DVec3) -> bool {
-        self.tissue.no_go().is_some_and(|field| field.forbids(point.as_vec3()))
+        self.depth_bounds(point, need)[0] >= need
+            && !self.tissue.no_go().is_some_and(|field| field.forbids(point.as_vec3()))
     }
 
     /// An upper bound of the depth of a point, and whether it may be reached by the tissue within `reach`.
@@ -139,11 +137,42 @@ impl Domain {
         self.searched(point)
     }
 
-    /// Whether a segment of this radius is inside, with its distance from the border.
+    /// Whether a segment of this radius is inside, with its distance from the border, and nowhere forbidden.
     ///
-    /// A vessel enters the tissue at its root. So the segment from a root may be nearer to the border on its first
-    /// stretch, twice as long as what is needed.
+    /// A vessel enters the tissue at its root. So the segment from a root may be nearer to the border, or to what is
+    /// forbidden, on its first stretch, twice as long as what is needed.
     pub(super) fn holds(&self, from: DVec3, to: DVec3, radius: f64, is_entrance: bool) -> bool {
+        self.keeps_in(from, to, radius, is_entrance) && !self.forbids(from, to, radius, is_entrance)
+    }
+
+    /// Whether a segment of this radius leads through what is forbidden.
+    fn forbids(&self, from: DVec3, to: DVec3, radius: f64, is_entrance: bool) -> bool {
+        let Some(field) = self.tissue.no_go() else { return false };
+        let length = from.distance(to);
+        let free = if is_entrance { (2.0 * radius).min(length) } else { 0.0 };
+        let beyond = from.lerp(to, free / length.max(f64::MIN_POSITIVE));
+        field.forbids_way([beyond, to], radius, || self.points_of([beyond, to], radius))
+            || is_entrance && field.forbids_way([from, to], 0.0, || self.points_of([from, to], 0.0))
+    }
+
+    /// Points of a segment on its axis and, where it is wide, around that: no farther apart than a step along it.
+    fn points_of(&self, [from, to]: [DVec3; 2], radius: f64) -> impl Iterator<Item = Vec3> {
+        let (way, step) = (to - from, self.diagonal() / STEPS);
+        let count = (way.length() / step).ceil().max(1.0);
+        let (across, up) = match self.dimension {
+            2 => (self.axes[2].cross(way).normalize_or_zero(), DVec3::ZERO),
+            _ => way.normalize_or(DVec3::X).any_orthonormal_pair(),
+        };
+        let around = [across, -across, up, -up].map(|side| side * radius);
+        let sides = if 2.0 * radius > step { 4 } else { 0 };
+        let along = (0..=count as u32).map(move |at| from + way * (f64::from(at) / count));
+        along.flat_map(move |at| {
+            let wall = around.into_iter().take(sides).map(move |side| at + side);
+            std::iter::once(at).chain(wall).map(|point| point.as_vec3())
+        })
+    }
+
+    fn keeps_in(&self, from: DVec3, to: DVec3, radius: f64, is_entrance: bool) -> bool {
         let need = radius + self.border;
         let length = from.distance(to);
         let skipped = if is_entrance { (2.0 * need).min(length) } else { 0.0 };

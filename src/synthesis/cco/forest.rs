@@ -17,7 +17,11 @@ pub(super) const NONE: u32 = u32::MAX;
 
 /// A node, and the segment that ends in it. A root node has no parent, no segment and one child; only a given tree has
 /// others with one child.
+///
+/// A walk to the root meets one node after the other, far apart in memory, so each is as large as a line of the
+/// processor's cache. What follows from the rest at little cost is not stored: lengths, and powers of loads.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Node {
     /// Its position, in tissue lengths.
     pub at: Vec3,
@@ -28,14 +32,16 @@ pub(super) struct Node {
     pub tree: u32,
     /// Flow of the terminals at and below it, in that of a mean terminal.
     pub flow: f64,
-    /// Length of the segment.
-    pub length: f64,
-    /// Sums of the segment with all below it; for a root, of its child.
-    pub sums: Sums,
+    /// X of the [sums](Sums) of the segment with all below it.
+    pub load: f64,
+    /// W of them.
+    pub volume: f64,
+    /// Length of the segment, rounded up: a quick proof that something is out of its reach.
+    pub reach: f32,
     /// A radius that the segment may have without touching another one or the border.
     pub bound: f32,
-    /// The largest ratio of radius to bound in the subtree, for a segment of radius 1.
-    pub strain: f64,
+    /// The largest ratio of radius to bound in the subtree, for a segment of radius 1, rounded up.
+    pub strain: f32,
 }
 
 impl Node {
@@ -47,27 +53,27 @@ impl Node {
             children: [NONE; 2],
             tree,
             flow,
-            length: 0.0,
-            sums: Sums::default(),
+            load: 0.0,
+            volume: 0.0,
+            reach: 0.0,
             bound: f32::INFINITY,
             strain: 0.0,
         }
     }
 
+    /// Stores the sums of the segment.
+    pub(super) fn set(&mut self, sums: &Sums) {
+        (self.load, self.volume) = (sums.load, sums.volume);
+    }
+
     pub(super) fn is_terminal(&self) -> bool {
         self.children[0] == NONE
     }
+}
 
-    /// What is below the segment.
-    pub(super) fn below(&self, exponent: Exponent) -> Below {
-        if self.is_terminal() {
-            return Below::default();
-        }
-        let load = self.sums.load - self.flow * self.length;
-        let square = load.sqrt();
-        let span = self.sums.volume / self.sums.load.sqrt() - self.length;
-        Below { load, power: exponent.raise(load, square), span }
-    }
+/// A number above 0 in f32 that is no smaller.
+pub(super) fn rounded_up(value: f64) -> f32 {
+    (value * (1.0 + 1.0e-7)) as f32
 }
 
 /// All nodes of all trees.
@@ -105,9 +111,33 @@ impl Forest {
         self.node(node).at.as_dvec3()
     }
 
-    /// Sums of a node; zero for `NONE`.
-    pub(super) fn sums(&self, node: u32) -> Sums {
-        if node == NONE { Sums::default() } else { self.node(node).sums }
+    /// Length of a segment.
+    pub(super) fn length(&self, segment: u32) -> f64 {
+        self.length_of(self.node(segment))
+    }
+
+    fn length_of(&self, segment: &Node) -> f64 {
+        segment.at.as_dvec3().distance(self.place(segment.parent))
+    }
+
+    /// Sums of a segment with all below it; zero for `NONE`.
+    pub(super) fn sums(&self, segment: u32) -> Sums {
+        if segment == NONE {
+            return Sums::default();
+        }
+        let Node { load, volume, .. } = *self.node(segment);
+        Sums { load, power: self.exponent.raise(load, load.sqrt()), volume }
+    }
+
+    /// What is below a segment.
+    pub(super) fn below(&self, segment: u32) -> Below {
+        let own = self.node(segment);
+        if own.is_terminal() {
+            return Below::default();
+        }
+        let length = self.length_of(own);
+        let load = own.load - own.flow * length;
+        Below { load, power: self.exponent.raise(load, load.sqrt()), span: own.volume / own.load.sqrt() - length }
     }
 
     /// Sums of the other child of a segment's parent; zero without one.
@@ -132,7 +162,7 @@ impl Forest {
                 return Ascent { root: sums, slope, thinning };
             }
             let below = Below::join(&sums, &self.sister(child), self.exponent);
-            let above = Sums::of(node.flow + gain, node.length, &below, self.exponent);
+            let above = Sums::of(node.flow + gain, self.length_of(node), &below, self.exponent);
             slope.rise(&sums, &below, &above);
             thinning *= sums.load / below.load;
             (child, sums) = (parent, above);
@@ -145,7 +175,7 @@ impl Forest {
         if parent.parent == NONE {
             return 1.0;
         }
-        self.node(node).sums.load / (parent.sums.load - parent.flow * parent.length)
+        self.node(node).load / (parent.load - parent.flow * self.length_of(parent))
     }
 
     /// The fourth power of a segment's radius, where the radius of a load of 1 at full pressure is 1.
@@ -154,7 +184,7 @@ impl Forest {
         loop {
             let parent = self.node(node).parent;
             if self.node(parent).parent == NONE {
-                return product * self.node(node).sums.load;
+                return product * self.node(node).load;
             }
             product *= self.thinning(node);
             node = parent;
@@ -162,10 +192,10 @@ impl Forest {
     }
 
     /// The [strain](Node::strain) of a segment, from its bound and its children.
-    pub(super) fn strain_of(&self, node: u32) -> f64 {
+    pub(super) fn strain_of(&self, node: u32) -> f32 {
         let own = self.node(node);
         let of_children = own.children.iter().filter(|&&child| child != NONE);
-        let strains = of_children.map(|&child| self.thinning(child).sqrt().sqrt() * self.node(child).strain);
-        strains.fold(f64::from(own.bound).recip(), f64::max)
+        let strains = of_children.map(|&child| self.thinning(child).sqrt().sqrt() * f64::from(self.node(child).strain));
+        rounded_up(strains.fold(f64::from(own.bound).recip(), f64::max))
     }
 }

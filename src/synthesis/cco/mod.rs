@@ -24,6 +24,7 @@ mod clearance;
 mod depths;
 mod distance;
 mod domain;
+mod dwindling;
 mod error;
 mod forest;
 mod given;

@@ -2,7 +2,7 @@
 
 use super::{
     domain::Domain,
-    forest::{Forest, NONE, Node},
+    forest::{Forest, NONE, Node, rounded_up},
     index::SegmentGrid,
     sums::{Below, Sums},
 };
@@ -92,7 +92,7 @@ impl Space {
     pub(super) fn undo(&mut self) {
         let moved = std::mem::take(&mut self.moved);
         for &segment in &moved {
-            self.index.remove(segment);
+            self.index.remove(&self.forest, segment);
         }
         while let Some((node, before)) = self.before.pop() {
             *self.forest.node_mut(node) = before;
@@ -138,8 +138,8 @@ impl Space {
     pub(super) fn split(&mut self, segment: u32, place: DVec3, terminal: DVec3) -> [u32; 2] {
         let (parent, tree) = (self.forest.node(segment).parent, self.forest.node(segment).tree);
         let joint = self.forest.nodes.len() as u32;
-        let below = self.forest.node(segment).below(self.forest.exponent);
-        self.index.remove(segment);
+        let below = self.forest.below(segment);
+        self.index.remove(&self.forest, segment);
         self.forest.nodes.push(Node::new(place.as_vec3(), parent, tree, 0.0));
         self.forest.nodes.push(Node::new(terminal.as_vec3(), joint, tree, self.share));
         let children = &mut self.change(parent).children;
@@ -158,9 +158,9 @@ impl Space {
     /// Moves a bifurcation.
     pub(super) fn shift(&mut self, joint: u32, place: DVec3) {
         let children = self.forest.node(joint).children;
-        let below = children.map(|child| self.forest.node(child).below(self.forest.exponent));
+        let below = children.map(|child| self.forest.below(child));
         for segment in [joint, children[0], children[1]] {
-            self.index.remove(segment);
+            self.index.remove(&self.forest, segment);
         }
         self.change(joint).at = place.as_vec3();
         for (child, below) in children.into_iter().zip(below) {
@@ -174,24 +174,24 @@ impl Space {
     /// Sets length and sums of a segment, whose node may be changed.
     pub(super) fn measure(&mut self, segment: u32, below: &Below) {
         let exponent = self.forest.exponent;
-        let length = self.forest.place(segment).distance(self.forest.place(self.forest.node(segment).parent));
+        let length = self.forest.length(segment);
         let node = self.forest.node_mut(segment);
-        node.length = length;
-        node.sums = Sums::of(node.flow, length, below, exponent);
+        node.reach = rounded_up(length);
+        node.set(&Sums::of(node.flow, length, below, exponent));
     }
 
     /// Carries changed sums of a bifurcation's children up to the root, with more flow on all the way.
     fn carry(&mut self, mut joint: u32, gain: f64) {
         let exponent = self.forest.exponent;
-        let parent = self.forest.node(joint).parent;
-        let length = self.forest.place(joint).distance(self.forest.place(parent));
-        self.change(joint).length = length;
+        let reach = rounded_up(self.forest.length(joint));
+        self.change(joint).reach = reach;
         loop {
+            let length = self.forest.length(joint);
             let [a, b] = self.forest.node(joint).children;
             let below = Below::join(&self.forest.sums(a), &self.forest.sums(b), exponent);
             let node = self.change(joint);
             node.flow += gain;
-            node.sums = Sums::of(node.flow, node.length, &below, exponent);
+            node.set(&Sums::of(node.flow, length, &below, exponent));
             joint = node.parent;
             if self.forest.node(joint).parent == NONE {
                 return;

@@ -112,7 +112,10 @@ fn sums_and_strains_stay_exact_through_changes_and_undoing() {
         candidates.rank(&space, place, [0, 10], 1e-4, |_| true);
         if candidates.connect(&mut space, place, 1e-4) != Attempt::Connected {
             for (now, before) in space.forest.nodes.iter().zip(&before) {
-                assert_eq!((now.sums, now.bound, now.strain), (before.sums, before.bound, before.strain));
+                assert_eq!(
+                    (now.load, now.volume, now.bound, now.strain),
+                    (before.load, before.volume, before.bound, before.strain)
+                );
             }
         }
         if round % 3 == 0 {
@@ -123,7 +126,7 @@ fn sums_and_strains_stay_exact_through_changes_and_undoing() {
             let (own, (flow, sums)) = (space.forest.node(node), anew[node as usize]);
             assert_eq!(own.flow, flow);
             let close = |a: f64, b: f64| (a - b).abs() <= 1e-11 * b.abs();
-            assert!(close(own.sums.load, sums.load) && close(own.sums.volume, sums.volume), "{own:?} {sums:?}");
+            assert!(close(own.load, sums.load) && close(own.volume, sums.volume), "{own:?} {sums:?}");
             assert_eq!(own.strain, space.forest.strain_of(node), "node {node}");
             assert!(space.radius(node) <= f64::from(own.bound), "node {node}");
         }
