@@ -2,14 +2,21 @@
 //! OpenCCO gives.
 
 mod beyond;
+mod extremes;
 mod files;
+mod no_go;
 mod oracle;
 mod organs;
 mod quality;
 mod requests;
+mod steps;
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/shared.rs"]
+mod shared;
+#[path = "../common/torus.rs"]
+mod torus;
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
@@ -18,7 +25,7 @@ use bevy_vessels::synthesis::{
     tissue::{Ball, Disc, Extent, Tissue},
     tree::{VesselKind, hash_trees},
 };
-use oracle::{check, check_overlaps};
+use oracle::check;
 use std::sync::Arc;
 
 /// Arteries from one root, the tissue's nearest point to `root`.
@@ -57,23 +64,6 @@ fn every_tree_is_sound_in_every_tissue() {
             growth.run().unwrap_or_else(|error| panic!("{}: {error}", case.name));
             check(case.name, &growth);
         }
-    }
-}
-
-#[test]
-fn no_segments_overlap_at_any_step() {
-    let tissues: [Arc<dyn Tissue>; 2] =
-        [Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball")), Arc::new(Disc::flat(0.5).expect("a disc"))];
-    for tissue in tissues {
-        // Thick vessels, which are often in each other's way.
-        let settings = CcoSettings { terminals: 250, ..CcoSettings::default() };
-        let mut growth = arteries(tissue, settings, Vec3::Y * 0.5, 4);
-        while !growth.is_finished() {
-            growth.advance();
-            growth.settle();
-            check_overlaps("step by step", &growth);
-        }
-        check("thick vessels", &growth);
     }
 }
 

@@ -97,7 +97,7 @@ impl Candidates {
             found.clear();
             space.index.near(point, point, reach, |segment| {
                 let node = space.forest.node(segment);
-                let end = reach + f64::from(node.reach);
+                let end = reach + node.reach();
                 if point.distance_squared(node.at.as_dvec3()) <= end * end && may_join(node.tree) {
                     let distance = squared_to_segment(point, space.forest.place(node.parent), node.at.as_dvec3());
                     if distance <= square {

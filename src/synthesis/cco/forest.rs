@@ -10,10 +10,31 @@ use super::{
     power::Exponent,
     sums::{Below, Slope, Sums},
 };
+use crate::synthesis::segment_index::MAX_FLARE;
 use bevy_math::{DVec3, Vec3};
 
 /// No node.
 pub(super) const NONE: u32 = u32::MAX;
+/// The widest start of a segment that is drawn, in its own radii.
+pub(super) const FLARE: f64 = MAX_FLARE as f64;
+
+/// Steps from a flare of 1 to `FLARE`.
+const FLARE_STEPS: f64 = u16::MAX as f64;
+
+/// A ratio of the radius at a segment's start to that at its end, from 1 to `FLARE`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Flare(u16);
+
+impl Flare {
+    /// The least one that is no less than a ratio, or `FLARE`.
+    pub(super) fn at_least(ratio: f64) -> Self {
+        Self(((ratio - 1.0) / (FLARE - 1.0) * FLARE_STEPS).ceil().clamp(0.0, FLARE_STEPS) as u16)
+    }
+
+    pub(super) fn ratio(self) -> f64 {
+        1.0 + (FLARE - 1.0) * f64::from(self.0) / FLARE_STEPS
+    }
+}
 
 /// A node, and the segment that ends in it. A root node has no parent, no segment and one child; only a given tree has
 /// others with one child.
@@ -36,11 +57,14 @@ pub(super) struct Node {
     pub load: f64,
     /// W of them.
     pub volume: f64,
-    /// Length of the segment, rounded up: a quick proof that something is out of its reach.
-    pub reach: f32,
+    /// Length of the segment, rounded up: the upper half of the bits of an f32.
+    reach: u16,
+    /// How much wider than the bound the segment may start.
+    pub flare: Flare,
     /// A radius that the segment may have without touching another one or the border.
     pub bound: f32,
-    /// The largest ratio of radius to bound in the subtree, for a segment of radius 1, rounded up.
+    /// The largest ratio of radius to bound in the subtree, for a segment of radius 1, rounded up. That of the radius
+    /// with which a segment starts is included for all below the segment, but not for itself.
     pub strain: f32,
 }
 
@@ -55,7 +79,8 @@ impl Node {
             flow,
             load: 0.0,
             volume: 0.0,
-            reach: 0.0,
+            reach: 0,
+            flare: Flare::default(),
             bound: f32::INFINITY,
             strain: 0.0,
         }
@@ -64,6 +89,15 @@ impl Node {
     /// Stores the sums of the segment.
     pub(super) fn set(&mut self, sums: &Sums) {
         (self.load, self.volume) = (sums.load, sums.volume);
+    }
+
+    /// A length that is no less than the segment's: a quick proof that something is out of its reach.
+    pub(super) fn reach(&self) -> f64 {
+        f32::from_bits(u32::from(self.reach) << 16).into()
+    }
+
+    pub(super) fn set_reach(&mut self, length: f64) {
+        self.reach = (rounded_up(length).to_bits().saturating_add(0xFFFF) >> 16) as u16;
     }
 
     pub(super) fn is_terminal(&self) -> bool {
@@ -97,6 +131,14 @@ pub(super) struct Ascent {
 impl Forest {
     pub(super) fn new(exponent: Exponent) -> Self {
         Self { nodes: Vec::new(), exponent }
+    }
+
+    /// Takes memory for two more nodes. By an eighth at a time, since there may be millions.
+    pub(super) fn make_room(&mut self) {
+        let nodes = &mut self.nodes;
+        if nodes.capacity() - nodes.len() < 2 {
+            nodes.reserve_exact((nodes.len() / 8).max(64));
+        }
     }
 
     pub(super) fn node(&self, node: u32) -> &Node {
@@ -178,6 +220,11 @@ impl Forest {
         self.node(node).load / (parent.load - parent.flow * self.length_of(parent))
     }
 
+    /// The ratio of the radius of a segment's parent to its own; 1 for a root segment.
+    pub(super) fn widening(&self, segment: u32) -> f64 {
+        self.thinning(segment).sqrt().sqrt().recip()
+    }
+
     /// The fourth power of a segment's radius, where the radius of a load of 1 at full pressure is 1.
     pub(super) fn fourth_power(&self, mut node: u32) -> f64 {
         let mut product = 1.0;
@@ -191,11 +238,19 @@ impl Forest {
         }
     }
 
+    /// The radius with which a segment is drawn at its start, if it and its parent have these.
+    pub(super) fn start_radius(parent: f64, own: f64) -> f64 {
+        parent.min(FLARE * own)
+    }
+
     /// The [strain](Node::strain) of a segment, from its bound and its children.
     pub(super) fn strain_of(&self, node: u32) -> f32 {
         let own = self.node(node);
-        let of_children = own.children.iter().filter(|&&child| child != NONE);
-        let strains = of_children.map(|&child| self.thinning(child).sqrt().sqrt() * f64::from(self.node(child).strain));
-        rounded_up(strains.fold(f64::from(own.bound).recip(), f64::max))
+        let of_children = own.children.iter().filter(|&&child| child != NONE).map(|&child| {
+            let (radius, child) = (self.thinning(child).sqrt().sqrt(), self.node(child));
+            let at_start = Self::start_radius(1.0, radius) / (child.flare.ratio() * f64::from(child.bound));
+            at_start.max(radius * f64::from(child.strain))
+        });
+        rounded_up(of_children.fold(f64::from(own.bound).recip(), f64::max))
     }
 }

@@ -1,15 +1,15 @@
 //! Where segments are: a hashed grid for each octave of their size.
 //!
-//! The size of a segment is its length and twice its bound. A segment lies in the grid whose cells are just as large or
-//! larger, in the cell of its middle, so that it reaches at most half a cell beyond. That finds long and thick vessels
-//! as surely as short ones, and every segment is stored once.
+//! The size of a segment is its length and twice its bound at its widest. A segment lies in the grid whose cells are
+//! just as large or larger, in the cell of its middle, so that it reaches at most half a cell beyond. That finds long
+//! and thick vessels as surely as short ones, and every segment is stored once.
 //!
 //! Cells are known by a hash of 32 bits. Two that share one, which is rare, share their segments: a search meets some
 //! that are far away, as it does anyway.
 
 use super::{
     cell_map::CellMap,
-    forest::{Forest, NONE},
+    forest::{FLARE, Forest, NONE},
 };
 use bevy_math::DVec3;
 
@@ -129,7 +129,7 @@ impl SegmentGrid {
 
     fn size(forest: &Forest, segment: u32) -> f64 {
         let node = forest.node(segment);
-        forest.length(segment) + 2.0 * f64::from(node.bound)
+        forest.length(segment) + 2.0 * FLARE * f64::from(node.bound)
     }
 
     /// Adds a segment, which must not be in the index.

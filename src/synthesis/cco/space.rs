@@ -2,7 +2,7 @@
 
 use super::{
     domain::Domain,
-    forest::{Forest, NONE, Node, rounded_up},
+    forest::{Forest, NONE, Node},
     index::SegmentGrid,
     sums::{Below, Sums},
 };
@@ -40,9 +40,10 @@ pub(super) struct Space {
     moved: Vec<u32>,
     /// Buffer: bounds of neighbours that become tighter.
     pub(super) tightened: Vec<(u32, f32)>,
-    /// Buffer: segments wider than their bounds, and segments still to be looked at with their radii.
+    /// Buffer: segments wider than their bounds, and segments still to be looked at, with their radii and those of
+    /// their parents.
     pub(super) wide: Vec<u32>,
-    pub(super) stack: Vec<(u32, f64)>,
+    pub(super) stack: Vec<(u32, f64, f64)>,
 }
 
 impl Space {
@@ -114,6 +115,7 @@ impl Space {
 
     /// Adds a tree with one segment.
     pub(super) fn plant(&mut self, root: DVec3, terminal: DVec3, unit: f64) -> [u32; 2] {
+        self.forest.make_room();
         let (tree, first) = (self.roots.len() as u32, self.forest.nodes.len() as u32);
         let mut node = Node::new(root.as_vec3(), NONE, tree, self.share);
         node.children[0] = first + 1;
@@ -140,6 +142,7 @@ impl Space {
         let joint = self.forest.nodes.len() as u32;
         let below = self.forest.below(segment);
         self.index.remove(&self.forest, segment);
+        self.forest.make_room();
         self.forest.nodes.push(Node::new(place.as_vec3(), parent, tree, 0.0));
         self.forest.nodes.push(Node::new(terminal.as_vec3(), joint, tree, self.share));
         let children = &mut self.change(parent).children;
@@ -176,15 +179,15 @@ impl Space {
         let exponent = self.forest.exponent;
         let length = self.forest.length(segment);
         let node = self.forest.node_mut(segment);
-        node.reach = rounded_up(length);
+        node.set_reach(length);
         node.set(&Sums::of(node.flow, length, below, exponent));
     }
 
     /// Carries changed sums of a bifurcation's children up to the root, with more flow on all the way.
     fn carry(&mut self, mut joint: u32, gain: f64) {
         let exponent = self.forest.exponent;
-        let reach = rounded_up(self.forest.length(joint));
-        self.change(joint).reach = reach;
+        let length = self.forest.length(joint);
+        self.change(joint).set_reach(length);
         loop {
             let length = self.forest.length(joint);
             let [a, b] = self.forest.node(joint).children;

@@ -29,6 +29,8 @@ const MEAN_CELLS: f64 = 24.0;
 /// The threshold falls no lower than this share of a terminal's own size, far below what terminals need that are drawn
 /// at random: there is no room if none is found by then.
 const LEAST_SHARE: f64 = 0.3;
+/// Terminals for which memory is taken in advance: there may be no room for as many as are asked for.
+const MOST_RESERVED: usize = 1 << 20;
 /// Cells that a thread looks at in a row.
 const BLOCK: u64 = 4096;
 /// Blocks that are looked at together.
@@ -72,7 +74,7 @@ impl Vacancy {
             let scale = size_of_share(domain, vacancy.mean_density(domain).recip()) / size_of_share(domain, 1.0);
             vacancy.least *= scale;
         }
-        vacancy.terminals.reserve_exact(terminals as usize);
+        vacancy.terminals.reserve_exact((terminals as usize).min(MOST_RESERVED));
         vacancy.rebuild(domain);
         vacancy
     }
