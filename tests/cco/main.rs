@@ -15,14 +15,12 @@ mod steps;
 mod common;
 #[path = "../common/shared.rs"]
 mod shared;
-#[path = "../common/torus.rs"]
-mod torus;
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     cco::{Cco, CcoSettings},
     roots::{RootPlacement, RootPlacements},
-    tissue::{Ball, Disc, Extent, Tissue},
+    tissue::{Ball, Extent, Tissue},
     tree::{VesselKind, hash_trees},
 };
 use oracle::check;

@@ -1,6 +1,6 @@
 //! No segment leads through what is forbidden, between its nodes either.
 
-use crate::{arteries, oracle::check, settings, torus::torus};
+use crate::{arteries, common::torus::torus, oracle::check, settings};
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     mesh::IndexedMesh,

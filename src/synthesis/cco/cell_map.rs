@@ -84,7 +84,7 @@ impl Part {
     fn slot(&self, key: u32) -> usize {
         // The bits below those of the part, as a share of all slots.
         let share = u64::from(hash(key) << PART_BITS);
-        let mut slot = (share * self.slots.len() as u64 >> u32::BITS) as usize;
+        let mut slot = ((share * self.slots.len() as u64) >> u32::BITS) as usize;
         while self.slots[slot][0] != key && self.slots[slot][0] != FREE {
             slot = if slot + 1 == self.slots.len() { 0 } else { slot + 1 };
         }
