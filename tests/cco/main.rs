@@ -4,22 +4,27 @@
 mod beyond;
 mod extremes;
 mod files;
+mod given_radii;
+mod no_go;
 mod oracle;
 mod organs;
 mod quality;
 mod requests;
+mod steps;
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/shared.rs"]
+mod shared;
 
 use bevy_math::Vec3;
 use bevy_vessels::synthesis::{
     cco::{Cco, CcoSettings},
     roots::{RootPlacement, RootPlacements},
-    tissue::{Ball, Disc, Extent, Tissue},
+    tissue::{Ball, Extent, Tissue},
     tree::{VesselKind, hash_trees},
 };
-use oracle::{check, check_overlaps};
+use oracle::check;
 use std::sync::Arc;
 
 /// Arteries from one root, the tissue's nearest point to `root`.
@@ -58,23 +63,6 @@ fn every_tree_is_sound_in_every_tissue() {
             growth.run().unwrap_or_else(|error| panic!("{}: {error}", case.name));
             check(case.name, &growth);
         }
-    }
-}
-
-#[test]
-fn no_segments_overlap_at_any_step() {
-    let tissues: [Arc<dyn Tissue>; 2] =
-        [Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball")), Arc::new(Disc::flat(0.5).expect("a disc"))];
-    for tissue in tissues {
-        // Thick vessels, which are often in each other's way.
-        let settings = CcoSettings { terminals: 250, ..CcoSettings::default() };
-        let mut growth = arteries(tissue, settings, Vec3::Y * 0.5, 4);
-        while !growth.is_finished() {
-            growth.advance();
-            growth.settle();
-            check_overlaps("step by step", &growth);
-        }
-        check("thick vessels", &growth);
     }
 }
 

@@ -4,34 +4,60 @@ use bevy_math::DVec3;
 use bevy_vessels::synthesis::{
     cco::{Cco, VesselFlow},
     growth::Growth,
+    segment_index::MAX_FLARE,
     tissue::Extent,
-    tree::{VesselKind, VesselTree},
+    tree::{NO_PARENT, VesselKind, VesselTree},
 };
 
-/// Nodes with their two ends, radius and node numbers.
+/// A segment as it is drawn: two ends with their radii, the nodes there, and the number of the tree.
 struct Tube {
     ends: [DVec3; 2],
-    radius: f64,
+    radii: [f64; 2],
     nodes: [usize; 2],
     tree: usize,
+}
+
+impl Tube {
+    fn length(&self) -> f64 {
+        self.ends[0].distance(self.ends[1])
+    }
+
+    /// Centre and radius at a share of the way.
+    fn at(&self, share: f64) -> (DVec3, f64) {
+        (self.ends[0].lerp(self.ends[1], share), self.radii[0] + share * (self.radii[1] - self.radii[0]))
+    }
 }
 
 fn tubes(growth: &Cco) -> Vec<Tube> {
     let trees = VesselKind::ALL.map(|kind| growth.tree(kind));
     let tubes_of = |(number, tree): (usize, &VesselTree)| {
-        let tube = |(node, parent): (usize, usize)| Tube {
-            ends: [parent, node].map(|node| tree.positions()[node].as_dvec3()),
-            radius: tree.radii()[node].into(),
-            nodes: [parent, node],
-            tree: number,
+        let tube = |(node, parent): (usize, usize)| {
+            let [above, own] = [parent, node].map(|node| tree.radii()[node]);
+            Tube {
+                ends: [parent, node].map(|node| tree.positions()[node].as_dvec3()),
+                radii: [above.min(MAX_FLARE * own), own].map(f64::from),
+                nodes: [parent, node],
+                tree: number,
+            }
         };
         tree.segments().map(tube).collect::<Vec<_>>()
     };
     trees.into_iter().enumerate().flat_map(tubes_of).collect()
 }
 
-/// Least distance between two segments: of the ends of each from the other, or where their lines come nearest.
-fn distance(a: &Tube, b: &Tube) -> f64 {
+/// Least of a convex function from 0 to 1, by thirds.
+fn least(value: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..50 {
+        let [first, second] = [(2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0];
+        if value(first) <= value(second) { high = second } else { low = first }
+    }
+    [0.0, 1.0, 0.5 * (low + high)].into_iter().map(value).fold(f64::INFINITY, f64::min)
+}
+
+/// Least distance between the axes of two segments: of the ends of each from the other, or where their lines come
+/// nearest.
+fn between_axes(a: &Tube, b: &Tube) -> f64 {
     let to = |point: DVec3, [from, to]: [DVec3; 2]| {
         let way = to - from;
         let share = ((point - from).dot(way) / way.length_squared()).clamp(0.0, 1.0);
@@ -50,23 +76,37 @@ fn distance(a: &Tube, b: &Tube) -> f64 {
     if inner { least.min(w.dot(normal).abs() / square.sqrt()) } else { least }
 }
 
-/// No two segments without a common node overlap, by comparing all with all.
-pub fn check_overlaps(name: &str, growth: &Cco) {
-    let tubes = tubes(growth);
-    for (number, a) in tubes.iter().enumerate() {
-        for b in &tubes[..number] {
-            let is_joined = a.tree == b.tree && a.nodes.iter().any(|node| b.nodes.contains(node));
-            if is_joined || a.ends[0].distance(b.ends[0]) > length(a) + length(b) + a.radius + b.radius {
-                continue;
-            }
-            let (distance, radii) = (distance(a, b), a.radius + b.radius);
-            assert!(distance >= radii, "{name}: {:?} and {:?} overlap: {distance} < {radii}", a.nodes, b.nodes);
-        }
-    }
+/// Least distance between the surfaces of two segments, negative if they overlap: of all balls of one from all of the
+/// other.
+fn distance(a: &Tube, b: &Tube) -> f64 {
+    least(|share| {
+        let (center, radius) = a.at(share);
+        least(|share| {
+            let (other, other_radius) = b.at(share);
+            center.distance(other) - radius - other_radius
+        })
+    })
 }
 
-fn length(tube: &Tube) -> f64 {
-    tube.ends[0].distance(tube.ends[1])
+/// No two segments without a common node overlap as they are drawn, by comparing all with all.
+pub fn check_overlaps(name: &str, growth: &Cco) {
+    let tubes = tubes(growth);
+    let box_of = |tube: &Tube| {
+        let [a, b] = tube.ends;
+        (a.min(b) - tube.radii[0], a.max(b) + tube.radii[0])
+    };
+    let boxes: Vec<(DVec3, DVec3)> = tubes.iter().map(box_of).collect();
+    for (number, a) in tubes.iter().enumerate() {
+        for (b, (min, max)) in tubes[..number].iter().zip(&boxes) {
+            let is_joined = a.tree == b.tree && a.nodes.iter().any(|node| b.nodes.contains(node));
+            let are_apart = boxes[number].0.cmpgt(*max).any() || boxes[number].1.cmplt(*min).any();
+            // Where the axes are farther apart than the widest balls are large, nothing is to be searched for.
+            if !is_joined && !are_apart && between_axes(a, b) < a.radii[0] + b.radii[0] {
+                let gap = distance(a, b);
+                assert!(gap >= 0.0, "{name}: {:?} and {:?} overlap by {}", a.nodes, b.nodes, -gap);
+            }
+        }
+    }
 }
 
 /// All that holds for every tree.
@@ -77,6 +117,8 @@ pub fn check(name: &str, growth: &Cco) {
         check_tree(name, growth, report.kind);
     }
     check_inside(name, growth);
+    let grown = growth.trees();
+    assert!(VesselKind::ALL.iter().all(|&kind| grown[kind].is_none_or(|grown| grown.waiting == 0)), "{name}");
 }
 
 /// Murray's law, flow, and what is reported of a kind.
@@ -141,23 +183,25 @@ fn check_flow(name: &str, growth: &Cco, kind: VesselKind) {
     }
 }
 
-/// Every segment keeps its whole width inside, by points along it. A root's may be nearer to the border where it
-/// enters.
-fn check_inside(name: &str, growth: &Cco) {
+/// Every segment keeps its whole width inside and out of what is forbidden, by points along it. A root's may be nearer
+/// to the border where it enters.
+pub fn check_inside(name: &str, growth: &Cco) {
     let tissue = growth.tissue();
     let trees: Vec<&VesselTree> = VesselKind::ALL.iter().map(|&kind| growth.tree(kind)).collect();
     for tube in tubes(growth) {
-        let is_entrance = trees[tube.tree].parents()[tube.nodes[0]] == bevy_vessels::synthesis::tree::NO_PARENT;
-        let need = tube.radius + f64::from(growth.settings().border_distance);
-        for step in 0..=20 {
-            let share = f64::from(step) / 20.0;
-            if is_entrance && share * length(&tube) < 2.0 * need {
+        let is_entrance = trees[tube.tree].parents()[tube.nodes[0]] == NO_PARENT;
+        let border = f64::from(growth.settings().border_distance);
+        for step in 0..=40 {
+            let share = f64::from(step) / 40.0;
+            let (center, radius) = tube.at(share);
+            let (point, need) = (center.as_vec3(), radius + border);
+            let is_forbidden = tissue.no_go().is_some_and(|field| field.forbids(point));
+            assert!(!is_forbidden, "{name}: {:?} leads through {point}", tube.nodes);
+            if is_entrance && share * tube.length() < 2.0 * need {
                 continue;
             }
-            let depth = f64::from(tissue.depth(tube.ends[0].lerp(tube.ends[1], share).as_vec3()).expect("a depth"));
+            let depth = f64::from(tissue.depth(point).expect("a depth"));
             assert!(depth >= need * (1.0 - 1e-5), "{name}: {:?} is {depth} deep, not {need}", tube.nodes);
         }
     }
-    let grown = growth.trees();
-    assert!(VesselKind::ALL.iter().all(|&kind| grown[kind].is_none_or(|grown| grown.waiting == 0)), "{name}");
 }

@@ -1,6 +1,6 @@
 //! Tissues for several tests.
 
-mod torus;
+pub mod torus;
 
 use bevy_math::{Vec2, Vec3};
 use bevy_vessels::synthesis::{

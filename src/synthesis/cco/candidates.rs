@@ -97,7 +97,7 @@ impl Candidates {
             found.clear();
             space.index.near(point, point, reach, |segment| {
                 let node = space.forest.node(segment);
-                let end = reach + node.length;
+                let end = reach + node.reach();
                 if point.distance_squared(node.at.as_dvec3()) <= end * end && may_join(node.tree) {
                     let distance = squared_to_segment(point, space.forest.place(node.parent), node.at.as_dvec3());
                     if distance <= square {
@@ -191,13 +191,13 @@ impl Space {
         let joint = Joint {
             ends: [forest.place(node.parent), node.at.as_dvec3(), point],
             flows: [node.flow, self.share],
-            below: [node.below(forest.exponent), Below::default()],
+            below: [forest.below(segment), Below::default()],
             exponent: forest.exponent,
         };
         let start = joint.start();
         let at_start = joint.sums(start);
         let (volume, slope) = paths.ascend(forest, segment, at_start.trunk, self.share);
-        let before = forest.node(self.root_segment(node.tree)).sums.volume;
+        let before = forest.node(self.root_segment(node.tree)).volume;
         let bound = volume - before - PROMISE * joint.promise(start, &at_start, &slope);
         Guess { segment, joint, at_start, slope, bound: if bound.is_finite() { bound } else { f64::NEG_INFINITY } }
     }
@@ -214,7 +214,7 @@ impl Space {
         let child = |child: usize| trunk * sums.children[child].load / sums.below.load;
         // 2r ≤ l, as fourth powers.
         let is_long = |(fourth, length): (f64, f64)| 16.0 * fourth <= (length * length) * (length * length);
-        let before = forest.node(self.root_segment(node.tree)).sums.volume;
+        let before = forest.node(self.root_segment(node.tree)).volume;
         let cost = ascent.root.volume - before;
         let are_long = [trunk, child(0), child(1)].into_iter().zip(sums.lengths).all(is_long);
         let ends = [joint.ends[0], joint.ends[1]];
@@ -230,7 +230,7 @@ impl Space {
     pub(super) fn connect(&mut self, candidate: &Candidate, terminal: DVec3) -> bool {
         self.begin();
         let [joint, end] = self.split(candidate.segment, candidate.place, terminal);
-        let has_room = !self.domain.is_forbidden(candidate.place) && self.has_room(&[joint, candidate.segment, end]);
+        let has_room = self.has_room(&[joint, candidate.segment, end]);
         if !has_room {
             self.undo();
         }

@@ -1,76 +1,103 @@
 //! A map from cells of a grid to numbers, by open addressing.
 //!
 //! The standard library's map is seeded at random and five times as slow. This one is only asked for single keys, never
-//! for its order.
+//! for its order. It lies in parts that grow one by one, by half, so that growing takes little more memory than what is
+//! there.
 
-const EMPTY: u64 = u64::MAX;
+/// Key of a free slot, which no cell has.
+const FREE: u32 = u32::MAX;
+/// Parts of the map.
+const PARTS: usize = 16;
+/// Bits of a hash that choose the part.
+const PART_BITS: u32 = PARTS.trailing_zeros();
+/// Slots of a new part.
+const FIRST_SLOTS: usize = 4;
 
-/// Numbers of cells.
+/// Numbers of cells, whose keys are below `u32::MAX`.
 #[derive(Clone, Debug)]
 pub(super) struct CellMap {
-    keys: Vec<u64>,
-    values: Vec<u32>,
+    parts: [Part; PARTS],
+}
+
+#[derive(Clone, Debug)]
+struct Part {
+    /// Keys and their numbers.
+    slots: Vec<[u32; 2]>,
     len: usize,
 }
 
 impl Default for CellMap {
     fn default() -> Self {
-        Self { keys: vec![EMPTY; 16], values: vec![0; 16], len: 0 }
+        let part = |_| Part { slots: vec![[FREE, 0]; FIRST_SLOTS], len: 0 };
+        Self { parts: std::array::from_fn(part) }
     }
+}
+
+/// Fibonacci hashing: the high bits of the product depend on all bits of the key.
+fn hash(key: u32) -> u32 {
+    key.wrapping_mul(0x9E37_79B1)
 }
 
 impl CellMap {
     pub(super) fn clear(&mut self) {
-        self.keys.fill(EMPTY);
-        self.len = 0;
-    }
-
-    /// The slot of a key, or the empty one where it belongs.
-    fn slot(&self, key: u64) -> usize {
-        let mask = self.keys.len() - 1;
-        // Fibonacci hashing: the high bits of the product depend on all bits of the key.
-        let mut slot = (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as usize & mask;
-        while self.keys[slot] != key && self.keys[slot] != EMPTY {
-            slot = (slot + 1) & mask;
+        for part in &mut self.parts {
+            part.slots.fill([FREE, 0]);
+            part.len = 0;
         }
-        slot
     }
 
-    pub(super) fn get(&self, key: u64) -> Option<u32> {
-        let slot = self.slot(key);
-        (self.keys[slot] == key).then(|| self.values[slot])
+    fn part(key: u32) -> usize {
+        (hash(key) >> (u32::BITS - PART_BITS)) as usize
     }
 
-    /// The number of a key, which is `value` if it is new.
-    pub(super) fn get_or_insert(&mut self, key: u64, value: u32) -> u32 {
-        let slot = self.slot(key);
-        if self.keys[slot] == key {
-            return self.values[slot];
-        }
-        (self.keys[slot], self.values[slot]) = (key, value);
-        self.len += 1;
-        // Three quarters full.
-        if 4 * self.len > 3 * self.keys.len() {
-            self.grow();
-        }
-        value
+    pub(super) fn get(&self, key: u32) -> Option<u32> {
+        let part = &self.parts[Self::part(key)];
+        let [found, value] = part.slots[part.slot(key)];
+        (found == key).then_some(value)
     }
 
-    fn grow(&mut self) {
-        let size = 2 * self.keys.len();
-        let keys = std::mem::replace(&mut self.keys, vec![EMPTY; size]);
-        let values = std::mem::replace(&mut self.values, vec![0; size]);
-        for (key, value) in keys.into_iter().zip(values) {
-            if key != EMPTY {
-                let slot = self.slot(key);
-                (self.keys[slot], self.values[slot]) = (key, value);
+    /// The number of a key, to be changed; `value` if the key is new.
+    pub(super) fn get_or_insert(&mut self, key: u32, value: u32) -> &mut u32 {
+        debug_assert!(key != FREE);
+        let part = &mut self.parts[Self::part(key)];
+        let mut slot = part.slot(key);
+        if part.slots[slot][0] != key {
+            // Three quarters full.
+            if 4 * (part.len + 1) > 3 * part.slots.len() {
+                part.grow();
+                slot = part.slot(key);
             }
+            part.slots[slot] = [key, value];
+            part.len += 1;
         }
+        &mut part.slots[slot][1]
     }
 
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.keys.capacity() * 8 + self.values.capacity() * 4
+        self.parts.iter().map(|part| part.slots.capacity() * size_of::<[u32; 2]>()).sum()
+    }
+}
+
+impl Part {
+    /// The slot of a key, or the free one where it belongs.
+    fn slot(&self, key: u32) -> usize {
+        // The bits below those of the part, as a share of all slots.
+        let share = u64::from(hash(key) << PART_BITS);
+        let mut slot = ((share * self.slots.len() as u64) >> u32::BITS) as usize;
+        while self.slots[slot][0] != key && self.slots[slot][0] != FREE {
+            slot = if slot + 1 == self.slots.len() { 0 } else { slot + 1 };
+        }
+        slot
+    }
+
+    fn grow(&mut self) {
+        let size = self.slots.len() + self.slots.len() / 2;
+        let slots = std::mem::replace(&mut self.slots, vec![[FREE, 0]; size]);
+        for [key, value] in slots.into_iter().filter(|slot| slot[0] != FREE) {
+            let slot = self.slot(key);
+            self.slots[slot] = [key, value];
+        }
     }
 }
 
@@ -79,16 +106,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_keep_their_first_number() {
+    fn keys_keep_their_first_number_until_it_is_changed() {
         let mut map = CellMap::default();
-        for key in 0..10_000u64 {
-            assert_eq!(map.get(key * key), None);
-            assert_eq!(map.get_or_insert(key * key, key as u32), key as u32);
-            assert_eq!(map.get_or_insert(key * key, 7), key as u32);
+        let keys = || (0..60_000u32).map(|key| key * key);
+        for key in keys() {
+            assert_eq!(map.get(key), None);
+            assert_eq!(*map.get_or_insert(key, !key), !key);
+            assert_eq!(*map.get_or_insert(key, 7), !key);
         }
-        for key in 0..10_000u64 {
-            assert_eq!(map.get(key * key), Some(key as u32));
+        for key in keys() {
+            assert_eq!(map.get(key), Some(!key));
+            *map.get_or_insert(key, 7) = key;
         }
+        assert!(keys().all(|key| map.get(key) == Some(key)));
+        // Between a half and three quarters full.
+        assert!((60_000 * 8 * 4 / 3..60_000 * 8 * 21 / 10).contains(&map.bytes()), "{} bytes", map.bytes());
         map.clear();
         assert_eq!(map.get(4), None);
     }

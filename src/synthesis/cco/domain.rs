@@ -5,13 +5,20 @@
 
 use super::depths::Depths;
 use super::{error::CcoError, power::cube_root, settings::CcoSettings};
-use crate::synthesis::tissue::{Extent, Tissue};
+use crate::synthesis::{
+    segment_index::round_cone::RoundCone,
+    tissue::{Extent, Tissue},
+};
 use bevy_math::{DVec3, Vec3};
 use std::sync::Arc;
 
 /// Excess of depth, as a share of what is needed, at which a segment that is traced counts as inside. It is the least
 /// step of the trace, too.
 const MARGIN: f64 = 0.01;
+/// Most diagonals of the tissue between it and the origin: an f32 has some hundred steps along it there.
+const FARTHEST: f32 = 65_536.0;
+/// Steps along the tissue's diagonal in which what cannot tell distances is asked whether it forbids a vessel.
+const STEPS: f64 = 512.0;
 
 /// A tissue with a border.
 #[derive(Clone, Debug)]
@@ -36,13 +43,17 @@ impl Domain {
     /// A tissue whose vessels may touch its border.
     ///
     /// # Errors
-    /// A tissue without an inside.
+    /// A tissue without an inside, or too far from the origin.
     pub(super) fn new(tissue: Arc<dyn Tissue>) -> Result<Self, CcoError> {
         if tissue.stage(1).is_some() {
             return Err(CcoError::NoInside { tissue: "a tissue in stages" });
         }
         let bounds = tissue.bounds();
         let (min, max) = (Vec3::from(bounds.min), Vec3::from(bounds.max));
+        let (distance, size) = (min.abs().max(max.abs()).max_element(), min.distance(max));
+        if distance > FARTHEST * size {
+            return Err(CcoError::TooFarAway { distance, size });
+        }
         let center = 0.5 * (min + max);
         if tissue.depth(center).is_none() {
             return Err(CcoError::NoInside {
@@ -118,12 +129,8 @@ impl Domain {
     /// Whether a point lies so deep in the tissue, and is not forbidden.
     pub(super) fn holds_point(&self, point: DVec3, radius: f64) -> bool {
         let need = radius + self.border;
-        self.depth_bounds(point, need)[0] >= need && !self.is_forbidden(point)
-    }
-
-    /// Whether a node may not be at a point.
-    pub(super) fn is_forbidden(&self, point: DVec3) -> bool {
-        self.tissue.no_go().is_some_and(|field| field.forbids(point.as_vec3()))
+        self.depth_bounds(point, need)[0] >= need
+            && !self.tissue.no_go().is_some_and(|field| field.forbids(point.as_vec3()))
     }
 
     /// An upper bound of the depth of a point, and whether it may be reached by the tissue within `reach`.
@@ -139,32 +146,64 @@ impl Domain {
         self.searched(point)
     }
 
-    /// Whether a segment of this radius is inside, with its distance from the border.
+    /// Whether a segment is inside, with its distance from the border, and nowhere forbidden. It may be no wider at its
+    /// end than at its start.
     ///
-    /// A vessel enters the tissue at its root. So the segment from a root may be nearer to the border on its first
-    /// stretch, twice as long as what is needed.
-    pub(super) fn holds(&self, from: DVec3, to: DVec3, radius: f64, is_entrance: bool) -> bool {
-        let need = radius + self.border;
-        let length = from.distance(to);
-        let skipped = if is_entrance { (2.0 * need).min(length) } else { 0.0 };
+    /// A vessel enters the tissue at its root. So the segment from a root may be nearer to the border, or to what is
+    /// forbidden, on its first stretch, twice as long as what is needed.
+    pub(super) fn holds(&self, cone: &RoundCone, is_entrance: bool) -> bool {
+        self.keeps_in(cone, is_entrance) && !self.forbids(cone, is_entrance)
+    }
+
+    /// Whether a segment leads through what is forbidden.
+    fn forbids(&self, &RoundCone { start, end, start_radius, .. }: &RoundCone, is_entrance: bool) -> bool {
+        let Some(field) = self.tissue.no_go() else { return false };
+        let length = start.distance(end);
+        let free = if is_entrance { (2.0 * start_radius).min(length) } else { 0.0 };
+        let beyond = start.lerp(end, free / length.max(f64::MIN_POSITIVE));
+        let is_met = |way: [DVec3; 2], radius: f64| field.forbids_way(way, radius, || self.points_of(way, radius));
+        is_met([beyond, end], start_radius) || is_entrance && is_met([start, end], 0.0)
+    }
+
+    /// Points of a segment on its axis and, where it is wide, around that: no farther apart than a step along it.
+    fn points_of(&self, [from, to]: [DVec3; 2], radius: f64) -> impl Iterator<Item = Vec3> {
+        let (way, step) = (to - from, self.diagonal() / STEPS);
+        let count = (way.length() / step).ceil().max(1.0);
+        let (across, up) = match self.dimension {
+            2 => (self.axes[2].cross(way).normalize_or_zero(), DVec3::ZERO),
+            _ => way.normalize_or(DVec3::X).any_orthonormal_pair(),
+        };
+        let around = [across, -across, up, -up].map(|side| side * radius);
+        let sides = if 2.0 * radius > step { 4 } else { 0 };
+        let along = (0..=count as u32).map(move |at| from + way * (f64::from(at) / count));
+        along.flat_map(move |at| {
+            let wall = around.into_iter().take(sides).map(move |side| at + side);
+            std::iter::once(at).chain(wall).map(|point| point.as_vec3())
+        })
+    }
+
+    fn keeps_in(&self, cone: &RoundCone, is_entrance: bool) -> bool {
+        let &RoundCone { start, end, start_radius, end_radius } = cone;
+        let length = start.distance(end);
+        let need = |at: f64| self.border + start_radius + (end_radius - start_radius) * (at / length);
+        let most = self.border + start_radius;
         // Sphere tracing: as deep as a point lies, so far along the segment nothing can be outside.
-        let middle = from.lerp(to, 0.5);
-        if self.depth_bounds(middle, need + 0.5 * length)[0] >= need + 0.5 * length {
+        if self.depth_bounds(start.midpoint(end), most + 0.5 * length)[0] >= most + 0.5 * length {
             return true;
         }
-        let direction = (to - from) / length.max(f64::MIN_POSITIVE);
-        let enough = need * (1.0 + MARGIN);
-        let mut at = skipped;
-        loop {
-            let depth = self.depth_bounds(from + direction * at, enough)[0];
+        let direction = (end - start) / length.max(f64::MIN_POSITIVE);
+        let mut at = if is_entrance { (2.0 * most).min(length) } else { 0.0 };
+        while at < length {
+            let (point, need) = (start + direction * at, need(at));
+            let enough = need * (1.0 + MARGIN);
+            let depth = self.depth_bounds(point, enough)[0];
             if depth < enough {
                 return false;
             }
             at += depth - need;
-            if at >= length {
-                // The end itself is a node, on which other segments rely.
-                return self.depth_bounds(to, enough)[0] >= enough;
-            }
         }
+        // The end itself is a node, on which other segments rely.
+        let enough = (self.border + end_radius) * (1.0 + MARGIN);
+        self.depth_bounds(end, enough)[0] >= enough
     }
 }

@@ -107,6 +107,17 @@ pub enum CcoError {
         /// What the tissue is.
         tissue: &'static str,
     },
+    /// A tissue so far from the origin that coordinates are too coarse for its vessels.
+    #[error(
+        "the tissue is {distance} tissue lengths from the origin and only {size} large; coordinates are too coarse \
+         there: move it nearer to the origin"
+    )]
+    TooFarAway {
+        /// The largest coordinate.
+        distance: f32,
+        /// The tissue's diagonal.
+        size: f32,
+    },
     /// No kind of vessels has a root.
     #[error("there is no root; place at least one")]
     NoRoot,

@@ -22,10 +22,13 @@ impl Grown {
             self.stack.push((space.roots[tree as usize], NO_PARENT, 0.0));
         }
         let forest = &space.forest;
+        let count = forest.nodes.iter().filter(|node| trees.contains(&node.tree)).count();
+        self.tree.reserve_exact(count);
+        self.birth_steps.reserve_exact(count);
         while let Some((node, parent, parent_fourth)) = self.stack.pop() {
             let own = forest.node(node);
             let fourth = if own.parent == NONE {
-                space.unit[own.tree as usize] * forest.node(own.children[0]).sums.load
+                space.unit[own.tree as usize] * forest.node(own.children[0]).load
             } else {
                 parent_fourth * forest.thinning(node)
             };

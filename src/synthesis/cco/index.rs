@@ -1,12 +1,15 @@
 //! Where segments are: a hashed grid for each octave of their size.
 //!
-//! The size of a segment is its length and twice its bound. A segment lies in the grid whose cells are just as large or
-//! larger, in the cell of its middle, so that it reaches at most half a cell beyond. That finds long and thick vessels
-//! as surely as short ones, and every segment is stored once.
+//! The size of a segment is its length and twice its bound at its widest. A segment lies in the grid whose cells are
+//! just as large or larger, in the cell of its middle, so that it reaches at most half a cell beyond. That finds long
+//! and thick vessels as surely as short ones, and every segment is stored once.
+//!
+//! Cells are known by a hash of 32 bits. Two that share one, which is rare, share their segments: a search meets some
+//! that are far away, as it does anyway.
 
 use super::{
     cell_map::CellMap,
-    forest::{Forest, NONE},
+    forest::{FLARE, Forest, NONE},
 };
 use bevy_math::DVec3;
 
@@ -14,6 +17,12 @@ use bevy_math::DVec3;
 const LEVELS: usize = 18;
 /// Bits of a coordinate in a cell's key.
 const BITS: u32 = 19;
+/// Segments of a grid up to which they are listed, for searches that would meet more cells than segments.
+const MOST_LISTED: usize = 1024;
+/// Segments of all grids whose levels are looked at in the time in which one cell is.
+const LEVELS_PER_CELL: f64 = 16.0;
+/// Level of what is in no grid.
+const NOWHERE: u8 = u8::MAX;
 
 /// An index over the segments of a [`Forest`].
 #[derive(Clone, Debug)]
@@ -24,18 +33,41 @@ pub(super) struct SegmentGrid {
     /// The finest grid in use.
     finest: usize,
     /// Segments of each grid.
-    members: [Vec<u32>; LEVELS],
-    cells: CellMap,
+    members: [Members; LEVELS],
     /// First segment of each cell.
-    heads: Vec<u32>,
+    cells: CellMap,
     /// Next segment in the cell of each.
     next: Vec<u32>,
-    /// Cell of each segment.
-    cell_of: Vec<u32>,
     /// Grid of each segment.
     level_of: Vec<u8>,
-    /// Place of each segment among the members of its grid.
-    place_of: Vec<u32>,
+}
+
+/// The segments of a grid.
+#[derive(Clone, Debug, Default)]
+struct Members {
+    count: usize,
+    /// All of them; empty from the time when they were too many until none is left.
+    list: Vec<u32>,
+    are_too_many: bool,
+}
+
+impl Members {
+    fn add(&mut self, segment: u32) {
+        self.count += 1;
+        if self.count > MOST_LISTED {
+            (self.are_too_many, self.list) = (true, Vec::new());
+        } else if !self.are_too_many {
+            self.list.push(segment);
+        }
+    }
+
+    fn remove(&mut self, segment: u32) {
+        self.count -= 1;
+        if let Some(place) = self.list.iter().position(|&member| member == segment) {
+            self.list.swap_remove(place);
+        }
+        self.are_too_many &= self.count > 0;
+    }
 }
 
 impl SegmentGrid {
@@ -48,19 +80,14 @@ impl SegmentGrid {
             finest: LEVELS - 1,
             members: Default::default(),
             cells: CellMap::default(),
-            heads: Vec::new(),
             next: Vec::new(),
-            cell_of: Vec::new(),
             level_of: Vec::new(),
-            place_of: Vec::new(),
         }
     }
 
     pub(super) fn reserve(&mut self, segments: usize) {
         self.next.reserve_exact(segments);
-        self.cell_of.reserve_exact(segments);
         self.level_of.reserve_exact(segments);
-        self.place_of.reserve_exact(segments);
     }
 
     fn cell_side(&self, level: usize) -> f64 {
@@ -85,15 +112,24 @@ impl SegmentGrid {
         ((point - self.origin) / self.cell_side(level)).to_array().map(|value| value.floor() as i64)
     }
 
-    fn key(level: usize, cell: [i64; 3]) -> u64 {
+    /// The key of a cell. The finest grids have 2¹⁹ cells along an axis, so coordinates need 19 bits.
+    fn key(level: usize, cell: [i64; 3]) -> u32 {
         let limit = (1i64 << BITS) - 1;
         let [x, y, z] = cell.map(|value| value.clamp(0, limit) as u64);
-        (((level as u64) << BITS | x) << BITS | y) << BITS | z
+        let number = (((level as u64) << BITS | x) << BITS | y) << BITS | z;
+        // Fibonacci hashing.
+        ((number.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32) as u32).min(u32::MAX - 1)
+    }
+
+    /// The cell of the middle of a segment.
+    fn key_of(&self, forest: &Forest, segment: u32, level: usize) -> u32 {
+        let middle = 0.5 * (forest.place(segment) + forest.place(forest.node(segment).parent));
+        Self::key(level, self.coordinates(level, middle))
     }
 
     fn size(forest: &Forest, segment: u32) -> f64 {
         let node = forest.node(segment);
-        node.length + 2.0 * f64::from(node.bound)
+        forest.length(segment) + 2.0 * FLARE * f64::from(node.bound)
     }
 
     /// Adds a segment, which must not be in the index.
@@ -101,49 +137,38 @@ impl SegmentGrid {
         let slot = segment as usize;
         if self.next.len() <= slot {
             self.next.resize(slot + 1, NONE);
-            self.cell_of.resize(slot + 1, NONE);
-            self.level_of.resize(slot + 1, 0);
-            self.place_of.resize(slot + 1, 0);
+            self.level_of.resize(slot + 1, NOWHERE);
         }
         let level = self.level(Self::size(forest, segment));
-        let middle = 0.5 * (forest.place(segment) + forest.place(forest.node(segment).parent));
-        let key = Self::key(level, self.coordinates(level, middle));
-        let cell = self.cells.get_or_insert(key, self.heads.len() as u32);
-        if cell as usize == self.heads.len() {
-            self.heads.push(NONE);
-        }
-        self.next[slot] = self.heads[cell as usize];
-        self.heads[cell as usize] = segment;
-        (self.cell_of[slot], self.level_of[slot]) = (cell, level as u8);
-        self.place_of[slot] = self.members[level].len() as u32;
-        self.members[level].push(segment);
+        let key = self.key_of(forest, segment, level);
+        let head = self.cells.get_or_insert(key, NONE);
+        self.next[slot] = std::mem::replace(head, segment);
+        self.level_of[slot] = level as u8;
+        self.members[level].add(segment);
     }
 
-    /// Takes a segment out.
-    pub(super) fn remove(&mut self, segment: u32) {
+    /// Takes a segment out, whose ends are where they were when it was added.
+    pub(super) fn remove(&mut self, forest: &Forest, segment: u32) {
         let slot = segment as usize;
-        let cell = self.cell_of[slot] as usize;
-        let after = self.next[slot];
-        if self.heads[cell] == segment {
-            self.heads[cell] = after;
+        let level = usize::from(std::mem::replace(&mut self.level_of[slot], NOWHERE));
+        let key = self.key_of(forest, segment, level);
+        let (head, after) = (self.cells.get_or_insert(key, NONE), self.next[slot]);
+        if *head == segment {
+            *head = after;
         } else {
-            let mut at = self.heads[cell] as usize;
+            let mut at = *head as usize;
             while self.next[at] != segment {
                 at = self.next[at] as usize;
             }
             self.next[at] = after;
         }
-        let (members, place) = (&mut self.members[self.level_of[slot] as usize], self.place_of[slot]);
-        members.swap_remove(place as usize);
-        if let Some(&last) = members.get(place as usize) {
-            self.place_of[last as usize] = place;
-        }
+        self.members[level].remove(segment);
     }
 
     /// Puts a segment into another grid if its bound has outgrown its cell.
     pub(super) fn refit(&mut self, forest: &Forest, segment: u32) {
         if Self::size(forest, segment) > self.cell_side(self.level_of[segment as usize].into()) {
-            self.remove(segment);
+            self.remove(forest, segment);
             self.insert(forest, segment);
         }
     }
@@ -151,7 +176,7 @@ impl SegmentGrid {
     /// Visits every segment that may come within `reach` of the line between two points, some of them twice, until
     /// `visit` returns false.
     pub(super) fn near(&self, from: DVec3, to: DVec3, reach: f64, mut visit: impl FnMut(u32) -> bool) {
-        for level in (0..LEVELS).filter(|&level| !self.members[level].is_empty()) {
+        for level in (0..LEVELS).filter(|&level| self.members[level].count > 0) {
             if !self.near_in(level, [from, to], reach, &mut visit) {
                 return;
             }
@@ -171,8 +196,12 @@ impl SegmentGrid {
         let (first, last) = cells(0.0);
         let number = (0..3).map(|axis| (last[axis] - first[axis] + 1) as f64).product::<f64>() * pieces;
         let members = &self.members[level];
-        if number > 2.0 * members.len() as f64 {
-            return members.iter().all(|&segment| visit(segment));
+        if !members.are_too_many && number > 2.0 * members.count as f64 {
+            return members.list.iter().all(|&segment| visit(segment));
+        }
+        if number * LEVELS_PER_CELL > self.level_of.len() as f64 && number > 2.0 * members.count as f64 {
+            let levels = (0..).zip(&self.level_of);
+            return levels.filter(|&(_, &own)| usize::from(own) == level).all(|(segment, _)| visit(segment));
         }
         for piece in 0..pieces as u64 {
             let (first, last) = cells(piece as f64);
@@ -189,8 +218,8 @@ impl SegmentGrid {
         true
     }
 
-    fn visit_cell(&self, key: u64, visit: &mut impl FnMut(u32) -> bool) -> bool {
-        let mut segment = self.cells.get(key).map_or(NONE, |cell| self.heads[cell as usize]);
+    fn visit_cell(&self, key: u32, visit: &mut impl FnMut(u32) -> bool) -> bool {
+        let mut segment = self.cells.get(key).unwrap_or(NONE);
         while segment != NONE {
             if !visit(segment) {
                 return false;
@@ -202,9 +231,7 @@ impl SegmentGrid {
 
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.cells.bytes()
-            + 4 * (self.heads.capacity() + self.next.capacity() + self.cell_of.capacity() + self.place_of.capacity())
-            + 4 * self.members.iter().map(Vec::capacity).sum::<usize>()
-            + self.level_of.capacity()
+        let lists = self.members.iter().map(|members| members.list.capacity()).sum::<usize>();
+        self.cells.bytes() + 4 * (self.next.capacity() + lists) + self.level_of.capacity()
     }
 }

@@ -9,6 +9,9 @@ use bevy_math::{Vec3, bounding::Aabb3d};
 /// Links each terminal of one tree to the nearest of the other, so that no terminal is left without; each pair once, in
 /// the order of the arterial nodes, then of the venous ones.
 pub(super) fn links(arteries: &VesselTree, veins: &VesselTree) -> Vec<BedLink> {
+    if arteries.is_empty() || veins.is_empty() {
+        return Vec::new();
+    }
     let [arterial, venous] = [arteries, veins].map(Ends::new);
     let there = arterial.ends.iter().filter_map(|&(node, at)| Some((node, venous.nearest(at)?)));
     let back = venous.ends.iter().filter_map(|&(node, at)| Some((arterial.nearest(at)?, node)));

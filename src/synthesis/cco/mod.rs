@@ -13,7 +13,17 @@
 //!
 //! At the end, and whenever the number of terminals has doubled, all bifurcations are moved to the best place under the
 //! present flows (`polish`). In contrast to OpenCCO, no two segments of any trees overlap at any time, unless they
-//! share a node, and every segment keeps its whole width inside the tissue, except where a vessel enters at its root.
+//! share a node, and every segment keeps its whole width inside the tissue and out of no-go regions, except where a
+//! vessel enters at its root.
+//!
+//! Blood flows in segments as in cylinders, as in OpenCCO. But a segment has room for the round cone that it is drawn
+//! and meshed as, which begins up to [`MAX_FLARE`] times as wide as it ends. So vessels that are drawn don't overlap
+//! either.
+//!
+//! A no-go region is avoided exactly. A function and painted vertices are asked along a segment, at least every 512th of
+//! the tissue's diagonal: what is narrower may be crossed.
+//!
+//! [`MAX_FLARE`]: crate::synthesis::segment_index::MAX_FLARE
 //!
 //! The domain grows with the number of terminals, as in section 3.3.1. Only radii depend on its size, by one common
 //! factor, so its growth moves nothing.
@@ -24,6 +34,7 @@ mod clearance;
 mod depths;
 mod distance;
 mod domain;
+mod dwindling;
 mod error;
 mod forest;
 mod given;
@@ -70,6 +81,8 @@ const POLISHED: u32 = 64;
 /// Number of nodes after which all bifurcations are polished for the first time. That is done again whenever the
 /// number has doubled, since later terminals join better trees then.
 const FIRST_SWEEP: usize = 64;
+/// Nodes for which memory is taken in advance: there may be no room for as many terminals as are asked for.
+const MOST_RESERVED: usize = 1 << 21;
 /// Places that a step draws at most.
 const DRAWS: u32 = 8;
 
@@ -120,7 +133,7 @@ impl Cco {
     /// see [`CcoSettings::fit`].
     ///
     /// # Errors
-    /// A setting outside its limits; a tissue that is neither flat nor solid; roots that cannot be placed as requested,
+    /// A setting outside its limits; a tissue that is neither flat nor solid, or too far from the origin; roots that cannot be placed as requested,
     /// that have no room for a vessel, or of which there are none; a given tree that is no binary one, or overlaps.
     pub fn new(tissue: Arc<dyn Tissue>, settings: CcoSettings, roots: &Roots, seed: u64) -> Result<Self, CcoError> {
         settings.validate()?;
@@ -178,6 +191,7 @@ impl Cco {
         let given = |kind| roots.given[kind].as_ref().filter(|tree| !tree.is_empty());
         let nodes = systems.iter().map(|system| given(system.kind).map_or(0, VesselTree::len)).sum::<usize>()
             + 2 * settings.terminals as usize * systems.len();
+        let nodes = nodes.min(MOST_RESERVED);
         space.forest.nodes.reserve_exact(nodes);
         space.index.reserve(nodes);
         for system in systems.iter_mut() {
@@ -307,7 +321,8 @@ impl Cco {
 
     /// Centre lines of a kind when it was [settled](Self::settle) last: an empty tree for kinds without a root.
     ///
-    /// Radii are cylinders' radii in tissue lengths. A root node has that of its segment.
+    /// Radii are in tissue lengths: those of cylinders through which blood flows as the settings say. Drawn segments
+    /// begin wider, and have room for that. A root node has the radius of its segment.
     pub fn tree(&self, kind: VesselKind) -> &VesselTree {
         static EMPTY: VesselTree = VesselTree::new();
         self.grown[kind].as_ref().map_or(&EMPTY, |grown| &grown.tree)
@@ -323,8 +338,8 @@ impl Cco {
         self.space.domain.millimetres(&self.settings)
     }
 
-    /// Number of pairs of segments, of the same tree or of two, that overlap as cylinders with round ends though they
-    /// share no node. It is 0, unless a given tree was so: a check of all that is promised.
+    /// Number of pairs of segments, of the same tree or of two, that overlap as the round cones that they are drawn as,
+    /// though they share no node. It is 0: a check of all that is promised.
     pub fn overlaps(&self) -> usize {
         self.space.overlaps()
     }

@@ -86,7 +86,7 @@ impl Paths {
                 break (sums.volume, slope);
             }
             let below = Below::join(&sums, &forest.sister(segment), forest.exponent);
-            let above = Sums::of(node.flow + gain, node.length, &below, forest.exponent);
+            let above = Sums::of(node.flow + gain, forest.length(parent), &below, forest.exponent);
             slope.rise(&sums, &below, &above);
             (segment, sums) = (parent, above);
         };

@@ -22,21 +22,21 @@ impl Space {
         let joint = Joint {
             ends: [forest.place(own.parent), forest.place(children[0]), forest.place(children[1])],
             flows: children.map(|child| forest.node(child).flow),
-            below: children.map(|child| forest.node(child).below(forest.exponent)),
+            below: children.map(|child| forest.below(child)),
             exponent: forest.exponent,
         };
         let (start, tree) = (own.at.as_dvec3(), own.tree);
         let changed = [node, children[0], children[1]];
-        let lengths = changed.map(|segment| forest.node(segment).length);
-        let slope = forest.ascend(node, own.sums, 0.0).slope;
+        let lengths = changed.map(|segment| forest.length(segment));
+        let slope = forest.ascend(node, forest.sums(node), 0.0).slope;
         let best = joint.settle(start, &joint.sums(start), &slope, tolerance);
         if best.distance(start) < STILL * lengths.into_iter().fold(f64::MAX, f64::min) {
             return false;
         }
-        let before = self.forest.node(self.root_segment(tree)).sums.volume;
+        let before = self.forest.node(self.root_segment(tree)).volume;
         SHARES.into_iter().any(|share| {
             let moves = self.try_shift(node, start.lerp(best, share).as_vec3().as_dvec3());
-            let is_smaller = self.forest.node(self.root_segment(tree)).sums.volume < before;
+            let is_smaller = self.forest.node(self.root_segment(tree)).volume < before;
             if moves && !is_smaller {
                 self.undo();
             }
@@ -48,11 +48,11 @@ impl Space {
     pub(super) fn try_shift(&mut self, node: u32, place: DVec3) -> bool {
         let [a, b] = self.forest.node(node).children;
         let changed = [node, a, b];
-        let lengths = changed.map(|segment| self.forest.node(segment).length);
+        let lengths = changed.map(|segment| self.forest.length(segment));
         self.begin();
         self.shift(node, place);
         let are_long = changed.iter().zip(lengths).all(|(&own, before)| self.is_long_enough(own, before));
-        let moves = are_long && !self.domain.is_forbidden(place) && self.has_room(&changed);
+        let moves = are_long && self.has_room(&changed);
         if !moves {
             self.undo();
         }

@@ -39,7 +39,7 @@ impl Space {
         let (reserve, mut best) = (std::mem::replace(&mut self.reserve, room), None);
         for place in self.directions().map(|direction| (own.at.as_dvec3() + direction * way).as_vec3().as_dvec3()) {
             if self.try_shift(node, place) {
-                let volume = self.forest.node(self.root_segment(own.tree)).sums.volume;
+                let volume = self.forest.node(self.root_segment(own.tree)).volume;
                 if best.is_none_or(|(least, _)| volume < least) {
                     best = Some((volume, place));
                 }

@@ -40,9 +40,10 @@ pub(super) struct Space {
     moved: Vec<u32>,
     /// Buffer: bounds of neighbours that become tighter.
     pub(super) tightened: Vec<(u32, f32)>,
-    /// Buffer: segments wider than their bounds, and segments still to be looked at with their radii.
+    /// Buffer: segments wider than their bounds, and segments still to be looked at, with their radii and those of
+    /// their parents.
     pub(super) wide: Vec<u32>,
-    pub(super) stack: Vec<(u32, f64)>,
+    pub(super) stack: Vec<(u32, f64, f64)>,
 }
 
 impl Space {
@@ -92,7 +93,7 @@ impl Space {
     pub(super) fn undo(&mut self) {
         let moved = std::mem::take(&mut self.moved);
         for &segment in &moved {
-            self.index.remove(segment);
+            self.index.remove(&self.forest, segment);
         }
         while let Some((node, before)) = self.before.pop() {
             *self.forest.node_mut(node) = before;
@@ -114,6 +115,7 @@ impl Space {
 
     /// Adds a tree with one segment.
     pub(super) fn plant(&mut self, root: DVec3, terminal: DVec3, unit: f64) -> [u32; 2] {
+        self.forest.make_room();
         let (tree, first) = (self.roots.len() as u32, self.forest.nodes.len() as u32);
         let mut node = Node::new(root.as_vec3(), NONE, tree, self.share);
         node.children[0] = first + 1;
@@ -138,8 +140,9 @@ impl Space {
     pub(super) fn split(&mut self, segment: u32, place: DVec3, terminal: DVec3) -> [u32; 2] {
         let (parent, tree) = (self.forest.node(segment).parent, self.forest.node(segment).tree);
         let joint = self.forest.nodes.len() as u32;
-        let below = self.forest.node(segment).below(self.forest.exponent);
-        self.index.remove(segment);
+        let below = self.forest.below(segment);
+        self.index.remove(&self.forest, segment);
+        self.forest.make_room();
         self.forest.nodes.push(Node::new(place.as_vec3(), parent, tree, 0.0));
         self.forest.nodes.push(Node::new(terminal.as_vec3(), joint, tree, self.share));
         let children = &mut self.change(parent).children;
@@ -158,9 +161,9 @@ impl Space {
     /// Moves a bifurcation.
     pub(super) fn shift(&mut self, joint: u32, place: DVec3) {
         let children = self.forest.node(joint).children;
-        let below = children.map(|child| self.forest.node(child).below(self.forest.exponent));
+        let below = children.map(|child| self.forest.below(child));
         for segment in [joint, children[0], children[1]] {
-            self.index.remove(segment);
+            self.index.remove(&self.forest, segment);
         }
         self.change(joint).at = place.as_vec3();
         for (child, below) in children.into_iter().zip(below) {
@@ -174,24 +177,24 @@ impl Space {
     /// Sets length and sums of a segment, whose node may be changed.
     pub(super) fn measure(&mut self, segment: u32, below: &Below) {
         let exponent = self.forest.exponent;
-        let length = self.forest.place(segment).distance(self.forest.place(self.forest.node(segment).parent));
+        let length = self.forest.length(segment);
         let node = self.forest.node_mut(segment);
-        node.length = length;
-        node.sums = Sums::of(node.flow, length, below, exponent);
+        node.set_reach(length);
+        node.set(&Sums::of(node.flow, length, below, exponent));
     }
 
     /// Carries changed sums of a bifurcation's children up to the root, with more flow on all the way.
     fn carry(&mut self, mut joint: u32, gain: f64) {
         let exponent = self.forest.exponent;
-        let parent = self.forest.node(joint).parent;
-        let length = self.forest.place(joint).distance(self.forest.place(parent));
-        self.change(joint).length = length;
+        let length = self.forest.length(joint);
+        self.change(joint).set_reach(length);
         loop {
+            let length = self.forest.length(joint);
             let [a, b] = self.forest.node(joint).children;
             let below = Below::join(&self.forest.sums(a), &self.forest.sums(b), exponent);
             let node = self.change(joint);
             node.flow += gain;
-            node.sums = Sums::of(node.flow, node.length, &below, exponent);
+            node.set(&Sums::of(node.flow, length, &below, exponent));
             joint = node.parent;
             if self.forest.node(joint).parent == NONE {
                 return;

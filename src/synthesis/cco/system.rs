@@ -212,6 +212,9 @@ impl System {
         if is_joined {
             self.count(&space.domain, plan.place);
             self.refused = 0;
+            if self.is_done(settings) {
+                self.vacancy.close();
+            }
         } else {
             self.set_unit(space, old);
             self.relieve(space);
@@ -297,7 +300,7 @@ impl System {
         };
         for &tree in &self.trees {
             let root = space.root_segment(tree);
-            report.volume += PI * space.unit[tree as usize].sqrt() * space.forest.node(root).sums.volume;
+            report.volume += PI * space.unit[tree as usize].sqrt() * space.forest.node(root).volume;
             report.root_radius = report.root_radius.max(space.radius(root));
         }
         report

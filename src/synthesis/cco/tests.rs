@@ -2,7 +2,7 @@
 
 use super::{
     candidates::{Attempt, Candidates},
-    distance::squared_to_segment,
+    distance::{squared_between, squared_to_segment},
     domain::Domain,
     forest::{Forest, NONE},
     paths::Paths,
@@ -112,7 +112,10 @@ fn sums_and_strains_stay_exact_through_changes_and_undoing() {
         candidates.rank(&space, place, [0, 10], 1e-4, |_| true);
         if candidates.connect(&mut space, place, 1e-4) != Attempt::Connected {
             for (now, before) in space.forest.nodes.iter().zip(&before) {
-                assert_eq!((now.sums, now.bound, now.strain), (before.sums, before.bound, before.strain));
+                assert_eq!(
+                    (now.load, now.volume, now.bound, now.strain),
+                    (before.load, before.volume, before.bound, before.strain)
+                );
             }
         }
         if round % 3 == 0 {
@@ -123,10 +126,59 @@ fn sums_and_strains_stay_exact_through_changes_and_undoing() {
             let (own, (flow, sums)) = (space.forest.node(node), anew[node as usize]);
             assert_eq!(own.flow, flow);
             let close = |a: f64, b: f64| (a - b).abs() <= 1e-11 * b.abs();
-            assert!(close(own.sums.load, sums.load) && close(own.sums.volume, sums.volume), "{own:?} {sums:?}");
+            assert!(close(own.load, sums.load) && close(own.volume, sums.volume), "{own:?} {sums:?}");
             assert_eq!(own.strain, space.forest.strain_of(node), "node {node}");
             assert!(space.radius(node) <= f64::from(own.bound), "node {node}");
         }
     }
     assert!(space.forest.nodes.len() > 500);
+}
+
+#[test]
+fn bounds_of_no_two_segments_reach_into_each_other() {
+    let tissue: Arc<dyn Tissue> = Arc::new(Ball::new(Vec3::ZERO, 0.5).expect("a ball"));
+    let mut pairs = 0;
+    for (seed, unit) in (0..).zip([1e-7, 1e-8, 1e-9, 1e-10, 1e-12]) {
+        let mut rng = Stream::Statistics.rng(seed);
+        let (mut space, mut candidates) = (space(Arc::clone(&tissue), 2.6, unit), Candidates::default());
+        // Vessels a hundred times as wide beside the others.
+        space.begin();
+        let [_, segment] = space.plant(DVec3::new(0.05, 0.49, 0.0), DVec3::new(0.1, -0.1, 0.1), unit * 1e-8);
+        assert!(space.has_room(&[segment]));
+        for round in 0..120 {
+            let place = tissue.sample(&mut rng).expect("a point").as_dvec3();
+            let tree = round % 2;
+            candidates.rank(&space, place, [0, 10], 1e-4, |other| other == tree);
+            let attempt = candidates.connect(&mut space, place, 1e-4);
+            if let (Attempt::Failed, Some(blocked)) = (attempt, space.blocked.take()) {
+                space.relieve(blocked);
+            }
+            space.polish(rng.random_range(0..space.forest.nodes.len() as u32), 1e-4);
+            let segments = (0..space.forest.nodes.len() as u32).filter(|&node| space.forest.node(node).parent != NONE);
+            let cone = |node: u32| {
+                let own = space.forest.node(node);
+                space.cone(node, own.bound.into(), own.flare)
+            };
+            let cones: Vec<_> = segments.map(|node| (node, cone(node))).collect();
+            for (number, (segment, cone)) in cones.iter().enumerate() {
+                let (parent, radius) = (space.forest.node(*segment).parent, space.radius(*segment));
+                let is_entrance = space.forest.node(parent).parent == NONE;
+                let above = if is_entrance { radius } else { space.radius(parent) };
+                assert!(radius <= cone.end_radius, "{segment} is wider than its bound");
+                assert!(Forest::start_radius(above, radius) <= cone.start_radius, "the start of {segment} is wider");
+                for (other, beside) in &cones[..number] {
+                    // Far from each other, that is plain.
+                    let reach = cone.widest() + beside.widest();
+                    let ends = [[cone.start, cone.end], [beside.start, beside.end]];
+                    let is_near = squared_between(ends[0], ends[1]) < reach * reach;
+                    if is_near && !space.forest.are_incident(*segment, *other) {
+                        let depth = cone.depth_in(beside, f64::INFINITY);
+                        assert!(depth <= 1e-12 * reach, "{segment} and {other} by {depth:e} of {reach:e}");
+                        pairs += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(pairs > 1000, "{pairs} pairs near each other");
 }

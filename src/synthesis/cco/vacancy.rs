@@ -9,8 +9,8 @@
 //! Where the tissue's density ρ is below 1, terminals keep more distance: ρ^(−1/d) times the threshold in d dimensions,
 //! so that their number is in proportion to ρ.
 
-use super::{cell_map::CellMap, domain::Domain};
-use crate::synthesis::random::VesselRng;
+use super::{cell_map::CellMap, domain::Domain, dwindling::DwindlingList};
+use crate::synthesis::{parallel, random::VesselRng};
 use bevy_math::{DVec3, Vec3};
 use rand::RngExt;
 
@@ -29,6 +29,12 @@ const MEAN_CELLS: f64 = 24.0;
 /// The threshold falls no lower than this share of a terminal's own size, far below what terminals need that are drawn
 /// at random: there is no room if none is found by then.
 const LEAST_SHARE: f64 = 0.3;
+/// Terminals for which memory is taken in advance: there may be no room for as many as are asked for.
+const MOST_RESERVED: usize = 1 << 20;
+/// Cells that a thread looks at in a row.
+const BLOCK: u64 = 4096;
+/// Blocks that are looked at together.
+const BLOCKS: u64 = 64;
 
 /// The places for terminals of one kind.
 #[derive(Clone, Debug)]
@@ -39,7 +45,7 @@ pub(super) struct Vacancy {
     /// Cells along each axis of the domain.
     size: [u64; 3],
     /// Cells in which there may be room.
-    vacant: Vec<u32>,
+    vacant: DwindlingList,
     /// Terminals by their cells.
     taken: CellMap,
     terminals: Vec<Vec3>,
@@ -58,7 +64,7 @@ impl Vacancy {
             least: LEAST_SHARE * size_of_share(domain, f64::from(terminals)),
             side: 0.0,
             size: [0; 3],
-            vacant: Vec::new(),
+            vacant: DwindlingList::default(),
             taken: CellMap::default(),
             terminals: Vec::new(),
             failed: 0,
@@ -68,7 +74,7 @@ impl Vacancy {
             let scale = size_of_share(domain, vacancy.mean_density(domain).recip()) / size_of_share(domain, 1.0);
             vacancy.least *= scale;
         }
-        vacancy.terminals.reserve_exact(terminals as usize);
+        vacancy.terminals.reserve_exact((terminals as usize).min(MOST_RESERVED));
         vacancy.rebuild(domain);
         vacancy
     }
@@ -96,17 +102,31 @@ impl Vacancy {
         self.taken.clear();
         for number in 0..self.terminals.len() {
             let cell = self.cell(domain, self.terminals[number].as_dvec3());
-            self.taken.get_or_insert(cell, number as u32);
+            self.taken.get_or_insert(cell as u32, number as u32);
         }
-        self.vacant.clear();
-        for cell in 0..self.cells() as u32 {
-            let number = u64::from(cell);
-            let center = self.at(domain, number, DVec3::splat(0.5));
-            let is_free = self.taken.get(number).is_none() && domain.may_be_within(center, 0.5 * self.threshold);
-            if is_free && (self.is_uniform || self.may_hold(domain, number, center)) {
-                self.vacant.push(cell);
-            }
+        let mut vacant = std::mem::take(&mut self.vacant);
+        vacant.clear();
+        let blocks = self.cells().div_ceil(BLOCK).min(BLOCKS);
+        let mut found = vec![Vec::new(); blocks as usize];
+        let mut first = 0;
+        while first < self.cells() {
+            parallel::for_each(&mut found, |block, found: &mut Vec<u32>| {
+                let start = first + block as u64 * BLOCK;
+                let cells = start..(start + BLOCK).min(self.cells());
+                found.clear();
+                found.extend(cells.filter(|&cell| self.is_vacant(domain, cell)).map(|cell| cell as u32));
+            });
+            found.iter().flatten().for_each(|&cell| vacant.push(cell));
+            first += blocks * BLOCK;
         }
+        self.vacant = vacant;
+    }
+
+    /// Whether there may be room in a cell.
+    fn is_vacant(&self, domain: &Domain, cell: u64) -> bool {
+        let center = self.at(domain, cell, DVec3::splat(0.5));
+        let is_free = self.taken.get(cell as u32).is_none() && domain.may_be_within(center, 0.5 * self.threshold);
+        is_free && (self.is_uniform || self.may_hold(domain, cell, center))
     }
 
     /// The mean density of terminals in the domain, at the centres of cells.
@@ -167,8 +187,8 @@ impl Vacancy {
     pub(super) fn draw(&mut self, domain: &Domain, radius: f64, rng: &mut VesselRng) -> Option<DVec3> {
         loop {
             while self.failed < TRIES && !self.vacant.is_empty() {
-                let slot = rng.random_range(0..self.vacant.len() as u32) as usize;
-                let cell = u64::from(self.vacant[slot]);
+                let slot = rng.random_range(0..self.vacant.len());
+                let cell = u64::from(self.vacant.get(slot));
                 let within = DVec3::new(rng.random(), rng.random(), rng.random());
                 // Rounded, as it will be kept.
                 let point = self.at(domain, cell, within).as_vec3().as_dvec3();
@@ -215,7 +235,7 @@ impl Vacancy {
                     if (0..3).any(|axis| cell[axis] < 0 || cell[axis] > last[axis]) {
                         continue;
                     }
-                    let Some(number) = self.taken.get(self.number(cell)) else { continue };
+                    let Some(number) = self.taken.get(self.number(cell) as u32) else { continue };
                     let terminal = self.terminals[number as usize].as_dvec3();
                     if terminal.distance_squared(point) < square {
                         return Some(terminal);
@@ -237,7 +257,7 @@ impl Vacancy {
     /// Takes a place for a terminal.
     pub(super) fn take(&mut self, domain: &Domain, place: DVec3) {
         let cell = self.cell(domain, place);
-        self.taken.get_or_insert(cell, self.terminals.len() as u32);
+        self.taken.get_or_insert(cell as u32, self.terminals.len() as u32);
         self.terminals.push(place.as_vec3());
         self.failed = 0;
     }
@@ -252,9 +272,14 @@ impl Vacancy {
         self.threshold
     }
 
+    /// Gives back all memory, when no more places are needed. The threshold stays.
+    pub(super) fn close(&mut self) {
+        (self.vacant, self.taken, self.terminals) = (DwindlingList::default(), CellMap::default(), Vec::new());
+    }
+
     /// Bytes of memory.
     pub(super) fn bytes(&self) -> usize {
-        self.taken.bytes() + 4 * self.vacant.capacity() + 12 * self.terminals.capacity()
+        self.taken.bytes() + self.vacant.bytes() + 12 * self.terminals.capacity()
     }
 }
 

@@ -4,6 +4,7 @@
 //! In: a [`VesselTree`](crate::synthesis::tree::VesselTree). Out: a [`SegmentIndex`] that can be queried at any time of
 //! a growth.
 
+mod depth;
 mod index;
 mod overlaps;
 mod ray_cast;

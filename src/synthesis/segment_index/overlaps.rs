@@ -14,16 +14,11 @@ use crate::synthesis::{
     },
     tree::{NO_PARENT, NodeId, VesselTree},
 };
-use bevy_math::DVec3;
 
 /// Depth, as a share of the sum of both radii, up to which an overlap counts as a touch, which is none.
 ///
 /// It is far above the errors of rounding and of the search, for segments up to ten thousand radii long.
 const TOUCH: f64 = 1.0e-6;
-/// Halvings of the search, each by the golden ratio: to 3 · 10⁻¹³ of a segment's length.
-const SEARCH_STEPS: usize = 60;
-/// Share of an interval at which golden sections cut it: (√5 − 1) / 2.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// All pairs of segments that overlap though they are not neighbours, the lower node first, in order.
 ///
@@ -77,65 +72,16 @@ fn are_apart(tree: &VesselTree, ends: [u32; 2], most: f64) -> bool {
 }
 
 /// Whether two round cones share more than a touch.
-///
-/// The depth at which their balls overlap is a concave function of the places on both axes. So the deepest place of
-/// one, for the ball at each place of the other, leaves a concave function of one place, for golden sections.
 fn do_overlap(a: &RoundCone, b: &RoundCone) -> bool {
     let touch = TOUCH * (a.widest() + b.widest());
-    let depth = |share: f64| {
-        let ball = a.start.lerp(a.end, share);
-        a.start_radius + share * (a.end_radius - a.start_radius) - b.clearance(ball)
-    };
-    let [mut low, mut high] = [0.0, 1.0];
-    let at = |low: f64, high: f64| [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-    let [mut first, mut second] = at(low, high).map(depth);
-    if depth(low).max(depth(high)) > touch {
-        return true;
-    }
-    for _ in 0..SEARCH_STEPS {
-        if first.max(second) > touch {
-            return true;
-        }
-        if first >= second {
-            high = at(low, high)[1];
-            (first, second) = (depth(at(low, high)[0]), first);
-        } else {
-            low = at(low, high)[0];
-            (first, second) = (second, depth(at(low, high)[1]));
-        }
-    }
-    false
-}
-
-impl RoundCone {
-    fn widest(&self) -> f64 {
-        self.start_radius.max(self.end_radius)
-    }
-
-    /// Distance from a point to the surface, negative inside: the least |point − c| − r over the balls of the cone.
-    fn clearance(&self, point: DVec3) -> f64 {
-        let (axis, rise) = (self.end - self.start, self.end_radius - self.start_radius);
-        let length = axis.length();
-        let share = if length <= rise.abs() {
-            // One ball holds all the others.
-            if rise >= 0.0 { 1.0 } else { 0.0 }
-        } else {
-            let to_point = point - self.start;
-            let along = to_point.dot(axis) / length;
-            let aside = (to_point - axis * (along / length)).length();
-            // The nearest ball is ahead of the point's foot where the cone widens: its slope is that of the surface.
-            let slope = rise / length;
-            ((along + aside * slope / (1.0 - slope * slope).sqrt()) / length).clamp(0.0, 1.0)
-        };
-        point.distance(self.start.lerp(self.end, share)) - (self.start_radius + share * rise)
-    }
+    a.depth_in(b, touch) > touch
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::synthesis::random::{Stream, VesselRng};
-    use bevy_math::Vec3;
+    use bevy_math::{DVec3, Vec3};
     use rand::RngExt;
 
     fn any_point(rng: &mut VesselRng) -> Vec3 {

@@ -27,7 +27,7 @@ pub fn start_radius(tree: &VesselTree, node: usize) -> f32 {
 
 /// The balls between two ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct RoundCone {
+pub(crate) struct RoundCone {
     /// Centre at the end towards the root.
     pub start: DVec3,
     /// Centre at the node.

@@ -173,6 +173,14 @@ impl VesselTree {
         &mut self.positions
     }
 
+    /// Takes memory for exactly so many nodes, where there are fewer.
+    pub(crate) fn reserve_exact(&mut self, nodes: usize) {
+        let more = nodes.saturating_sub(self.len());
+        self.positions.reserve_exact(more);
+        self.parents.reserve_exact(more);
+        self.radii.reserve_exact(more);
+    }
+
     /// Empties the tree and keeps its memory.
     pub(crate) fn clear(&mut self) {
         self.positions.clear();
