@@ -28,6 +28,7 @@ const PLUGIN: &str = "
  circulation    organ  vessels  growth  surgery
  deformation    organ  vessels  growth
  surface        organ  vessels  growth
+ texture        organ  vessels  growth
  scene          vessels  growth
 ";
 
@@ -44,6 +45,7 @@ const RENDER: &str = "
  buffer         levels  chunk  material  stumps
  segments       levels  limits  chunk  material  upload  detail  buffer
  surfaces       chunk  material  buffer
+ textures
  take_over      chunk  buffer
 ";
 

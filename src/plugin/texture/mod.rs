@@ -47,6 +47,7 @@ impl Plugin for TexturePlugin {
     fn build(&self, app: &mut App) {
         VesselsPlugin::ensure(app, self.schedule);
         order::configure(app, self.schedule);
+        app.register_required_components::<VesselTexture, VesselMaps>();
         app.add_message::<TextureReady>()
             .add_message::<TextureFailed>()
             .add_observer(show::remove_maps)

@@ -1,6 +1,5 @@
 //! What a user asks of the texture of an organ.
 
-use crate::plugin::texture::maps::VesselMaps;
 use crate::synthesis::{
     texture::{BakeSettings, VesselLook},
     tree::VesselKind,
@@ -17,7 +16,7 @@ use std::collections::BTreeMap;
 /// [`Vasculature`](crate::plugin::Vasculature), or on an organ with vessels of your own. The organ's mesh needs texture
 /// coordinates that lay it out without overlaps, and tangents if the map of normals is to be drawn.
 ///
-/// The maps are in [`VesselMaps`]. Where there is a renderer, they take the place of those of the organ's
+/// The maps are in [`VesselMaps`](crate::plugin::VesselMaps). Where there is a renderer, they take the place of those of the organ's
 /// `StandardMaterial`, which comes back when the texture is no longer shown. The vessels that were drawn while they grew
 /// give way to the texture, and come back if they grow again. A cut does not change the texture.
 ///
@@ -30,7 +29,6 @@ use std::collections::BTreeMap;
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 #[reflect(Component, Default, Clone, PartialEq)]
-#[require(VesselMaps)]
 pub struct VesselTexture {
     /// How large the maps are, and which ones are made. Changing it makes new maps; until these are ready, the old ones
     /// are shown.
