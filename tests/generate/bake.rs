@@ -54,7 +54,8 @@ fn vessels_are_baked_into_textures_of_the_mesh() {
     }
     assert!(files[4].ends_with("_000001_id.png"), "{}", files[4]);
     let ids = image::open(&files[4]).expect("ids").to_rgba8();
-    assert!(ids.pixels().filter(|texel| texel.0[3] > 0).count() > 50, "vessels");
+    let texels = ids.pixels().filter(|texel| texel.0[3] > 0).count();
+    assert!(texels > 50, "vessels in {texels} texels");
     // What is there is not baked again, and its figures are those of the bake.
     let again = generate(&[&arguments[..], &["--resume"]].concat());
     assert_eq!(again[0]["bake"], lines[0]["bake"]);

@@ -16,6 +16,7 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("SegmentBuffer", "buffers on the graphics card"),
     ("ChangeLog", "what changed in which frame"),
     ("VesselIndex", "made anew from the Vessels"),
+    ("VesselMaps", "made anew from the Vessels"),
     ("VesselMesh", "made anew from the Vessels"),
 ];
 
