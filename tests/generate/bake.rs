@@ -41,7 +41,9 @@ fn vessels_are_baked_into_textures_of_the_mesh() {
     fs::write(folder.path("square.obj"), square(true)).expect("a mesh");
     let (mesh, out) = (folder.path("square.obj"), folder.path("out"));
     let maps = "--maps=albedo,normal,height,roughness,id,depth";
-    let arguments = ["--tissue", &mesh, "--mode=surface", "--bake=64", maps, "--out", &out];
+    // Vessels as wide as a texel, so that texels lie within them.
+    let wide = "--set=arterial.terminal_radius=0.01";
+    let arguments = ["--tissue", &mesh, "--mode=surface", "--bake=64", wide, maps, "--out", &out];
     let lines = generate(&arguments);
     let bake = &lines[0]["bake"];
     assert!(bake["ms"].as_f64().is_some_and(|ms| ms > 0.0));
