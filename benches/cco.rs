@@ -25,7 +25,7 @@ fn organ(name: &str) -> Option<Arc<dyn Tissue>> {
 /// Grows the arteries of an organ whose lengths are metres, without sweeps at the end.
 fn grow(tissue: &Arc<dyn Tissue>, terminals: u32, root: RootPlacement) -> Cco {
     let perfusion = match tissue.extent() {
-        Extent::Volume(volume) => volume * 1e9,
+        Extent::Volume(volume) | Extent::Sheet { volume, .. } => volume * 1e9,
         Extent::Area(area) => area * 1e6,
         Extent::Length(_) => unreachable!("it has no inside"),
     };

@@ -29,13 +29,13 @@ fn useless_texture_coordinates_are_refused_with_a_reason() {
     assert!(matches!(with_uvs(|uv| uv * 12.0), Err(BakeError::TiledUvs { .. })));
     assert!(with_uvs(|uv| uv + 3.0).is_ok(), "wrapped");
     let bad = CanvasAttributes { uvs: vec![Vec2::ZERO; 3], ..CanvasAttributes::default() };
-    let error = Canvas::new(square(4), bad).err().expect("an error");
+    let error = Canvas::new(square(4), bad).expect_err("an error");
     assert_eq!(error.to_string(), "the mesh has 3 texture coordinates for 25 vertices; give one per vertex, or none");
 }
 
 #[test]
 fn settings_out_of_their_limits_are_named() {
-    let error = BakeSettings { size: 1000, ..BakeSettings::default() }.validate().err().expect("an error");
+    let error = BakeSettings { size: 1000, ..BakeSettings::default() }.validate().expect_err("an error");
     assert_eq!(error.to_string(), "a texture cannot be 1000 texels wide; set a power of two from 16 to 8192");
     let none = BakeSettings { maps: Maps::NONE, ..BakeSettings::default() };
     assert_eq!(none.validate(), Err(BakeError::NoMaps));

@@ -69,7 +69,7 @@ impl Atlas {
         let thinnest = self.widths.iter().copied().fold(f32::INFINITY, f32::min);
         let suffices = (WIDE_ENOUGH / thinnest).min(1.0e9) as u32;
         let suffices = Some((suffices + 1).next_power_of_two()).filter(|&size| size <= BakeSettings::MOST_SIZE);
-        (charts > 0).then(|| BakeWarning::ThinCharts { charts, thinnest: thinnest * size as f32, suffices })
+        (charts > 0).then_some(BakeWarning::ThinCharts { charts, thinnest: thinnest * size as f32, suffices })
     }
 }
 

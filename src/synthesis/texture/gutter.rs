@@ -50,7 +50,7 @@ async fn nearest_in_columns(coverage: &[u8], size: usize, repeats: bool, pace: &
         let row = step % size;
         for (column, last) in last.iter_mut().enumerate() {
             let texel = row * size + column;
-            *last = if coverage[texel] != 0 { 0 } else { last.saturating_add(1).min(NONE) };
+            *last = if coverage[texel] != 0 { 0 } else { last.saturating_add(1) };
             // The nearest above lies upwards.
             if *last != NONE && (ways[texel] == NONE || *last < -ways[texel]) {
                 ways[texel] = -*last;
@@ -63,7 +63,7 @@ async fn nearest_in_columns(coverage: &[u8], size: usize, repeats: bool, pace: &
         let row = (rounds - 1 - step) % size;
         for (column, last) in last.iter_mut().enumerate() {
             let texel = row * size + column;
-            *last = if coverage[texel] != 0 { 0 } else { last.saturating_add(1).min(NONE) };
+            *last = if coverage[texel] != 0 { 0 } else { last.saturating_add(1) };
             if *last != NONE && (ways[texel] == NONE || *last < ways[texel].abs()) {
                 ways[texel] = *last;
             }
@@ -100,13 +100,16 @@ fn nearest_in_row(known: &[u8], columns: &[i16], row: usize, repeats: [bool; 2])
         }
         lowest.push((column, value, from));
     }
-    let mut at = 0;
-    let mut sources = Vec::new();
-    for column in 0..size {
+    let (mut at, mut sources) = (0, Vec::new());
+    if lowest.is_empty() {
+        // A chart may be too small for any texel.
+        return sources;
+    }
+    for (column, known) in known.iter().enumerate() {
         while at + 1 < lowest.len() && lowest[at + 1].2 <= column as f64 {
             at += 1;
         }
-        if known[column] == 0 {
+        if *known == 0 {
             let from = lowest[at].0;
             let source_row = (row as i64 + i64::from(way(from))).rem_euclid(size as i64);
             let source = source_row * size as i64 + from.rem_euclid(size as i64);
