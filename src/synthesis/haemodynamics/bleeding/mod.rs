@@ -1,7 +1,7 @@
 //! Bleeding over time: the loss of each open end, until it stops.
 //!
-//! In: a [`Network`] with its interruptions, and the blood of the patient. Out: for every open end its flow, pressure,
-//! velocity, loss and state; the loss of the organ; ends that began or stopped bleeding.
+//! In: a [`Network`](super::Network) with its interruptions, and the blood of the patient. Out: for every open end its
+//! flow, pressure, velocity, loss and state; the loss of the organ; ends that began or stopped bleeding.
 //!
 //! A step evaluates openings, root and bed pressure at its middle, solves for the flow of all ends together and keeps
 //! it for the whole step. This is second order in the step, and the loss is exactly the time integral of the reported
