@@ -161,9 +161,7 @@ where
     I: Sync,
     O: Clone + Send,
 {
-    outputs.clear();
-    outputs.resize(inputs.len(), blank);
-    map_all(inputs, outputs, WORTH_SHARING, |_, input| map(input));
+    refill(inputs, outputs, blank, WORTH_SHARING, map);
 }
 
 /// As [`map_into`], for work whose threads sleep between.
@@ -172,9 +170,17 @@ where
     I: Sync,
     O: Clone + Send,
 {
+    refill(inputs, outputs, blank, WORTH_WAKING, map);
+}
+
+fn refill<I, O>(inputs: &[I], outputs: &mut Vec<O>, blank: O, least: usize, map: impl Fn(&I) -> O + Sync)
+where
+    I: Sync,
+    O: Clone + Send,
+{
     outputs.clear();
     outputs.resize(inputs.len(), blank);
-    map_all(inputs, outputs, WORTH_WAKING, |_, input| map(input));
+    map_all(inputs, outputs, least, |_, input| map(input));
 }
 
 /// Fills `outputs` with `map` of each index and input. Fewer than twice `least` of them are not worth sharing.

@@ -58,6 +58,11 @@ pub struct GrowthProgress {
 }
 
 impl GrowthProgress {
+    /// Whether the vessels are there to stay: what is made of them is worth its time.
+    pub(crate) fn is_grown(&self) -> bool {
+        matches!(self.phase, GrowthPhase::Finished | GrowthPhase::Regrowing | GrowthPhase::Failed)
+    }
+
     /// The progress of a growth in a phase.
     pub(crate) fn of(phase: GrowthPhase, growth: Option<&dyn Growth>, grow_time: Duration) -> Self {
         let Some(growth) = growth else { return Self { phase, grow_time, ..Self::default() } };

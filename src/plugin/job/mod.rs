@@ -63,6 +63,11 @@ pub(crate) fn catch_panic<T>(work: impl FnOnce() -> T) -> Outcome<T> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| JobPanic::new(&*payload))
 }
 
+/// The outcome of work that may fail, as one result.
+pub(crate) fn as_one<T, E: From<JobPanic>>(outcome: Outcome<Result<T, E>>) -> Result<T, E> {
+    outcome.unwrap_or_else(|panic| Err(panic.into()))
+}
+
 /// Does work until it ends or panics. A panic drops everything that the work has made.
 async fn guarded<T>(work: impl Future<Output = T>) -> Outcome<T> {
     AssertUnwindSafe(work).catch_unwind().await.map_err(|payload| JobPanic::new(&*payload))

@@ -4,12 +4,12 @@
 
 use crate::plugin::{
     announcer::Announcer,
-    growth::progress::{GrowthControl, GrowthPhase, GrowthProgress},
-    job::{Job, JobPanic, Jobs},
+    growth::progress::{GrowthControl, GrowthProgress},
+    job::{Job, Jobs, as_one},
     organ::rest::RestMesh,
     surface::{
         build::{Built, ITEMS, Source, build},
-        messages::{SurfaceFailed, SurfaceReady, VesselSurfaceError},
+        messages::{SurfaceFailed, SurfaceReady},
         settings::{SurfaceDetail, SurfaceMoment, SurfaceShown, VesselSurface},
         vessel_mesh::{MadeFor, VesselMesh},
     },
@@ -95,8 +95,7 @@ pub(crate) fn make_surfaces(
 impl SurfacedOrganItem<'_, '_> {
     /// Whether the vessels have grown, or did not grow here.
     fn is_grown(&self) -> bool {
-        let drawn_to_stay = [GrowthPhase::Finished, GrowthPhase::Regrowing, GrowthPhase::Failed];
-        self.progress.is_none_or(|progress| drawn_to_stay.contains(&progress.phase))
+        self.progress.is_none_or(GrowthProgress::is_grown)
     }
 
     /// Whether the vessels don't grow at the moment.
@@ -115,7 +114,7 @@ impl SurfacedVesselsItem<'_, '_> {
         let outcome = Job::poll(&mut job);
         mesh.coming = job.map(|job| (made_for.clone(), job));
         let (organ, vessels) = (self.of.0, self.entity);
-        match outcome.map(flat) {
+        match outcome.map(as_one) {
             None => {}
             Some(Ok((built, new))) => {
                 self.take_over(made_for, built, new, meshes);
@@ -180,9 +179,4 @@ impl SurfacedVesselsItem<'_, '_> {
             (self.mesh.is_ready, self.mesh.is_shown) = (is_ready, is_shown);
         }
     }
-}
-
-/// The outcome of a job as one result.
-fn flat<T>(outcome: Result<Result<T, VesselSurfaceError>, JobPanic>) -> Result<T, VesselSurfaceError> {
-    outcome.unwrap_or_else(|panic| Err(panic.into()))
 }

@@ -5,8 +5,8 @@
 
 use crate::plugin::{
     announcer::Announcer,
-    growth::progress::{GrowthPhase, GrowthProgress},
-    job::{Job, JobPanic, Jobs},
+    growth::progress::GrowthProgress,
+    job::{Job, Jobs, as_one},
     organ::{mesh::copy_mesh, rest::RestMesh},
     texture::{
         bake::{Baked, Shading, Source, bake},
@@ -96,8 +96,7 @@ impl TexturedOrganItem<'_, '_> {
 
     /// Whether the vessels have grown, or did not grow here.
     fn is_grown(&self) -> bool {
-        let drawn_to_stay = [GrowthPhase::Finished, GrowthPhase::Regrowing, GrowthPhase::Failed];
-        self.progress.is_none_or(|progress| drawn_to_stay.contains(&progress.phase))
+        self.progress.is_none_or(GrowthProgress::is_grown)
     }
 
     /// Takes over maps that have become ready.
@@ -107,7 +106,7 @@ impl TexturedOrganItem<'_, '_> {
         let mut job = Some(job);
         let outcome = Job::poll(&mut job);
         maps.coming = job.map(|job| (made_for.clone(), job));
-        match outcome.map(flat) {
+        match outcome.map(as_one) {
             None => {}
             Some(Ok(baked)) => self.take_over(made_for, baked, assets, news),
             Some(Err(error)) => self.fail(made_for, error, news),
@@ -212,9 +211,4 @@ impl TexturedOrganItem<'_, '_> {
             (self.maps.is_ready, self.maps.is_shown, self.maps.hides_vessels) = decided;
         }
     }
-}
-
-/// The outcome of a job as one result.
-fn flat(outcome: Result<Result<Baked, VesselTextureError>, JobPanic>) -> Result<Baked, VesselTextureError> {
-    outcome.unwrap_or_else(|panic| Err(panic.into()))
 }
