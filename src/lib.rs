@@ -25,6 +25,7 @@
 //! - [`plugin`] brings it into a Bevy world: components, a time budget for each frame, messages. Vessels can also be
 //!   cut and bleed: see [`Cuttable`](plugin::Cuttable) and [`Perfusion`](plugin::Perfusion).
 //! - [`render`] draws the segments by instancing while they grow.
+//! - `ui` is a panel to tweak them with, behind a feature.
 //!
 //! # Units
 //!
@@ -40,6 +41,9 @@
 //! | `parallel` | yes | large steps on all threads, with the same result on any number |
 //! | `serialize` | with `plugin` | settings and presets as RON files |
 //! | `mesh_files` | no | organ meshes from GLB, glTF and OBJ files without Bevy |
+//! | `unwrap` | no | texture coordinates for meshes without usable ones |
+//! | `texture_files` | no | baked textures as PNG and KTX2 |
+//! | `ui` | no | a panel with every setting, presets, statistics and tools |
 //!
 //! # Frequent questions
 //!
@@ -71,6 +75,8 @@ pub mod synthesis;
 pub mod plugin;
 #[cfg(feature = "render")]
 pub mod render;
+#[cfg(feature = "ui")]
+pub mod ui;
 
 /// The names that most apps with vessels need: `use bevy_vessels::prelude::*`.
 #[cfg(feature = "plugin")]

@@ -35,12 +35,16 @@ struct Shown(ByKind<bool>);
 /// of colours, `M` switches between closed meshes, segments and textures.
 pub struct ControlsPlugin;
 
+/// What the keys of [`ControlsPlugin`] do.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ControlKeys;
+
 impl Plugin for ControlsPlugin {
     fn build(&self, app: &mut App) {
         let in_window = resource_exists_and_equals(View::Window);
         app.add_plugins(FrameTimeDiagnosticsPlugin::default())
             .insert_resource(Shown(ByKind::from_fn(|_| true)))
-            .add_systems(Update, (steer, show, switch, tell).chain().run_if(in_window));
+            .add_systems(Update, ((steer, show, switch).chain().in_set(ControlKeys), tell).chain().run_if(in_window));
     }
 }
 

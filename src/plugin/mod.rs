@@ -27,7 +27,7 @@ mod announcer;
 mod circulation;
 mod deformation;
 mod growth;
-mod job;
+pub(crate) mod job;
 mod lineage;
 mod order;
 mod organ;
@@ -45,7 +45,7 @@ pub use deformation::{DeformationPlugin, FollowsMesh, FollowsTetrahedra};
 pub use growth::{
     EntityCommandsExt, GrowthAction, GrowthBudget, GrowthCommand, GrowthControl, GrowthFailed, GrowthFinished,
     GrowthFrame, GrowthPhase, GrowthPlugin, GrowthProgress, GrowthStarted, GrowthState, OrganGrowthError, OrganPaint,
-    Vasculature, diagnostics,
+    RegrowsUnseen, Vasculature, diagnostics,
 };
 pub use job::{JobMode, JobPanic, JobSettings};
 pub use order::VesselSystems;

@@ -5,6 +5,7 @@ use std::{collections::BTreeSet, fs};
 
 /// The parts of the crate, each with the parts that it uses.
 const PARTS: &str = "
+ ui             plugin  synthesis
  render         plugin  synthesis
  plugin         synthesis
  synthesis
@@ -49,6 +50,25 @@ const RENDER: &str = "
  take_over      chunk  buffer
 ";
 
+/// Files of `ui`, each with those that it uses.
+const UI: &str = "
+ state
+ sketch
+ history
+ growth
+ organ
+ preset
+ statistics
+ products
+ focus          state
+ surgery        state  focus
+ knob           sketch
+ colonization   knob
+ optimisation   knob
+ generator      sketch  knob  colonization  optimisation
+ panel          state  sketch  history  growth  organ  preset  statistics  products  surgery  knob  generator
+";
+
 /// A table: the name of each row, with its entries.
 type Table = Vec<(&'static str, Vec<&'static str>)>;
 
@@ -74,9 +94,14 @@ fn rooms(part: &str) -> Option<BTreeSet<&'static str>> {
         "plugin" => Some(
             table(PLUGIN).into_iter().flat_map(|row| if row.0 == "ground" { row.1 } else { vec![row.0] }).collect(),
         ),
-        "render" => Some(table(RENDER).into_iter().map(|row| row.0).collect()),
+        "render" | "ui" => Some(table(files(part)).into_iter().map(|row| row.0).collect()),
         _ => None,
     }
+}
+
+/// The table of a part that has files for rooms.
+fn files(part: &str) -> &'static str {
+    if part == "ui" { UI } else { RENDER }
 }
 
 /// Whether a room of a part may use another one.
@@ -104,7 +129,7 @@ fn may_use(part: &str, room: &str, used: &str) -> bool {
                 _ => rows.iter().any(|row| row.0 == room && row.1.contains(&used)),
             }
         }
-        _ => table(RENDER).iter().any(|row| row.0 == room && row.1.contains(&used)),
+        _ => table(files(part)).iter().any(|row| row.0 == room && row.1.contains(&used)),
     }
 }
 
@@ -144,7 +169,7 @@ fn no_files_use_each_other_in_a_circle() {
 #[test]
 fn every_room_has_its_row_and_every_row_its_room() {
     let house = house();
-    for part in ["synthesis", "plugin", "render"] {
+    for part in ["synthesis", "plugin", "render", "ui"] {
         let built: BTreeSet<&str> = house
             .sources
             .iter()
@@ -158,7 +183,7 @@ fn every_room_has_its_row_and_every_row_its_room() {
 #[test]
 fn the_tables_are_the_pictures_of_the_architecture() {
     let page = fs::read_to_string(project().join("ARCHITECTURE.md")).unwrap();
-    for table in [PARTS, FLOORS, PLUGIN, RENDER] {
+    for table in [PARTS, FLOORS, PLUGIN, RENDER, UI] {
         assert!(page.contains(table), "ARCHITECTURE.md lacks this table, letter for letter:\n{table}");
     }
 }

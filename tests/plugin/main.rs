@@ -34,6 +34,7 @@ mod surface;
 mod texture;
 mod undo_limit;
 mod units;
+mod unseen;
 mod warnings;
 
 use bevy::{asset::AssetPlugin, ecs::message::MessageCursor, mesh::MeshPlugin, prelude::*};

@@ -20,6 +20,8 @@ pub(crate) enum Need {
     Nothing,
     /// Lay the new paint over the tissue, and grow successors there.
     Paint,
+    /// Grow with other settings or another seed, on the same tissue: from the roots, or as successors.
+    Settings,
     /// Start the growth again, on the same tissue.
     Growth,
     /// Prepare the tissue, then start the growth.
@@ -62,7 +64,7 @@ impl Followed {
         if self.settings.tissue != settings.tissue || needed(self.assets) != needed(assets) {
             Need::Tissue
         } else if self.settings != *settings || self.seed != seed {
-            Need::Growth
+            Need::Settings
         } else if *self.paint != *paint {
             Need::Paint
         } else {
@@ -102,13 +104,13 @@ mod tests {
         let same = followed.settings.clone();
         assert_eq!(followed.need(&same, 0, &blank, MESH), Need::Nothing);
         assert_eq!(followed.need(&same, 0, &blank, SourceAssets::default()), Need::Tissue);
-        assert_eq!(followed.need(&same, 1, &blank, MESH), Need::Growth);
+        assert_eq!(followed.need(&same, 1, &blank, MESH), Need::Settings);
         assert_eq!(followed.need(&following(TissueMode::Volume).settings, 0, &blank, MESH), Need::Tissue);
         let unfitted = Preset { fit: false, ..same.clone() };
-        assert_eq!(followed.need(&unfitted, 0, &blank, MESH), Need::Growth);
+        assert_eq!(followed.need(&unfitted, 0, &blank, MESH), Need::Settings);
         let painted = TissuePaint { density: Some(vec![1.0]), ..blank };
         assert_eq!(followed.need(&same, 0, &painted, MESH), Need::Paint);
-        assert_eq!(followed.need(&same, 1, &painted, MESH), Need::Growth);
+        assert_eq!(followed.need(&same, 1, &painted, MESH), Need::Settings);
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub use budget::{GrowthBudget, GrowthFrame};
 pub use commands::EntityCommandsExt;
 pub use messages::{GrowthAction, GrowthCommand, GrowthFailed, GrowthFinished, GrowthStarted, OrganGrowthError};
 pub use paint::OrganPaint;
-pub use progress::{GrowthControl, GrowthPhase, GrowthProgress};
+pub use progress::{GrowthControl, GrowthPhase, GrowthProgress, RegrowsUnseen};
 pub use state::GrowthState;
 pub use vasculature::Vasculature;
 

@@ -26,8 +26,8 @@ pub enum GrowthPhase {
     /// No steps are done until severed vessels are whole again, as
     /// [`Cuttable::growth`](crate::plugin::Cuttable::growth) says.
     Held,
-    /// The organ's [paint](crate::plugin::OrganPaint) has changed, and new vessels grow unseen on the new paint. The
-    /// drawn vessels stay until the new ones have done as many steps. Numbers of steps and nodes are those of the new
+    /// The organ's [paint](crate::plugin::OrganPaint) has changed, or its settings where it has [`RegrowsUnseen`], and new
+    /// vessels grow unseen. The drawn vessels stay until the new ones have done as many steps. Numbers of steps and nodes are those of the new
     /// vessels.
     Regrowing,
     /// All steps are done.
@@ -106,6 +106,17 @@ pub enum GrowthControl {
     /// prepared.
     Paused,
 }
+
+/// Lets vessels with changed settings or another seed grow unseen: the drawn vessels stay until the new ones have done as
+/// many steps. Put it beside the [`Vasculature`](crate::plugin::Vasculature) of an organ whose settings are tweaked.
+///
+/// Changes that come before the new vessels are drawn wait for that, and only the last of them counts: a slider that moves
+/// all the time shows one growth after the other, and there is always something to see. Without this component, vessels
+/// start from their roots in view, at every change. [`GrowthAction::Restart`](crate::plugin::GrowthAction::Restart) does so
+/// in either case.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect, serde::Serialize, serde::Deserialize)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct RegrowsUnseen;
 
 impl GrowthControl {
     /// Pauses a running growth, or resumes a paused one.

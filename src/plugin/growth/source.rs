@@ -12,7 +12,7 @@ use crate::plugin::{
         followed::{Need, SourceAssets},
         messages::{GrowthCommand, GrowthFailed, GrowthStarted, OrganGrowthError},
         paint::OrganPaint,
-        progress::{GrowthControl, GrowthPhase, GrowthProgress},
+        progress::{GrowthControl, GrowthPhase, GrowthProgress, RegrowsUnseen},
         shared::{SharedTissue, SharedTissues},
         start::StartOrder,
         state::GrowthState,
@@ -34,7 +34,7 @@ use bevy::{
         change_detection::{DetectChanges, DetectChangesMut, Ref, Res, ResMut},
         entity::Entity,
         message::MessageReader,
-        query::QueryData,
+        query::{Has, QueryData},
         system::{Local, Query, SystemParam},
     },
     image::Image,
@@ -56,6 +56,7 @@ pub(crate) struct Organ {
     pub(crate) state: &'static mut GrowthState,
     pub(crate) progress: &'static mut GrowthProgress,
     rest: Option<&'static RestMesh>,
+    unseen: Has<RegrowsUnseen>,
 }
 
 /// The messages of a growth that starts, or fails to.
@@ -115,7 +116,7 @@ pub(crate) fn begin(
     mut account: StartAccount,
     jobs: Jobs,
 ) {
-    let waiting = organs.iter().filter(|organ| organ.state.need != Need::Nothing).map(|organ| organ.entity);
+    let waiting = organs.iter().filter(|organ| organ.state.next_need() != Need::Nothing).map(|organ| organ.entity);
     account.start_in_turn(waiting.collect(), |organ| {
         let Ok(mut organ) = organs.get_mut(organ) else { return };
         let outcome = organ.begin(&mut assets, Some(&jobs));
@@ -205,7 +206,7 @@ impl OrganItem<'_, '_> {
             let paint = self.paint.as_ref().map_or(&blank, |paint| &paint.0);
             // Blood makes no vessels.
             let settings = Preset { blood: None, ..Preset::from(&*self.wish) };
-            self.state.follow(settings, self.wish.seed, paint, assets);
+            self.state.follow((settings, self.wish.seed, self.unseen), paint, assets);
         }
     }
 

@@ -39,6 +39,10 @@ pub struct GrowthState {
     preparation: Option<Preparation>,
     /// Whether the next growth to start grows unseen, beside vessels that stay meanwhile.
     beside: bool,
+    /// Whether growths with other settings grow unseen.
+    unseen: bool,
+    /// Whether the drawn vessels grew with settings or a seed that are no longer asked for.
+    pub(super) other_settings: bool,
     pub(super) tissue: Option<PaintedTissue>,
     /// Lineage of the current or coming tissue. Paint does not change it.
     tissue_lineage: Lineage,
@@ -116,13 +120,24 @@ impl GrowthState {
                 self.finish = false;
                 self.demand(Need::Growth);
             }
-            GrowthAction::Finish => self.finish = true,
+            GrowthAction::Finish => {
+                self.finish = true;
+                self.skip_outdated();
+            }
         }
         control
     }
 
     /// Compares the inputs with those that the growth follows, and demands the work that a difference needs.
-    pub(crate) fn follow(&mut self, settings: Preset, seed: u64, paint: &TissuePaint, assets: SourceAssets) {
+    ///
+    /// Growths with other settings or another seed grow unseen if `unseen`.
+    pub(crate) fn follow(
+        &mut self,
+        (settings, seed, unseen): (Preset, u64, bool),
+        paint: &TissuePaint,
+        assets: SourceAssets,
+    ) {
+        self.unseen = unseen;
         let Some(followed) = &mut self.followed else {
             self.followed = Some(Followed { settings, seed, paint: Arc::new(paint.clone()), assets });
             self.demand(Need::Tissue);
@@ -133,6 +148,7 @@ impl GrowthState {
         if followed.settings != settings || followed.seed != seed {
             (followed.settings, followed.seed) = (settings, seed);
             self.steps_to_repeat = 0;
+            self.other_settings = true;
         }
         if *followed.paint != *paint {
             followed.paint = Arc::new(paint.clone());
@@ -186,6 +202,7 @@ impl GrowthState {
     /// now.
     pub(crate) fn request_finish(&mut self) {
         self.finish = true;
+        self.skip_outdated();
         if self.preparation.take().is_some() {
             self.demand(if self.tissue.is_none() {
                 Need::Tissue
@@ -197,13 +214,34 @@ impl GrowthState {
         }
     }
 
+    /// Drops a successor whose settings are no longer asked for.
+    fn skip_outdated(&mut self) {
+        if self.awaits_settings() {
+            self.successor = None;
+            self.preparation.take_if(|_| self.beside);
+        }
+    }
+
     /// The work to do now. If it needs a tissue, that comes first, unless one is on its way.
     pub(crate) fn next_need(&self) -> Need {
         match self.need {
-            Need::Growth | Need::Paint if self.tissue.is_none() && self.preparation.is_some() => Need::Nothing,
-            Need::Growth | Need::Paint if self.tissue.is_none() => Need::Tissue,
+            Need::Growth | Need::Settings | Need::Paint if self.tissue.is_none() => {
+                if self.preparation.is_some() {
+                    Need::Nothing
+                } else {
+                    Need::Tissue
+                }
+            }
+            // A slider that moves on lets each successor arrive, so that there is something to see.
+            Need::Settings if self.unseen && self.beside && self.preparation.is_some() => Need::Nothing,
+            Need::Settings if self.unseen && self.successor.is_some() => Need::Nothing,
             need => need,
         }
+    }
+
+    /// Whether settings have changed that no growth follows yet.
+    pub(super) fn awaits_settings(&self) -> bool {
+        self.need >= Need::Settings
     }
 
     /// Drops the tissue, the growth and a preparation under way, because they no longer belong to the organ.
@@ -219,11 +257,12 @@ impl GrowthState {
         }
     }
 
-    /// Decides whether a growth that is about to start on other paint grows beside drawn vessels. It does if there are
-    /// any.
+    /// Decides whether a growth that is about to start on other paint, or unseen, grows beside drawn vessels. It does if
+    /// there are any.
     pub(crate) fn choose_place(&mut self, need: Need) {
         let has_grown = |growth: &dyn Growth| growth.is_finished() || growth.progress().done > 0;
-        self.beside = need == Need::Paint && self.growth().is_some_and(has_grown);
+        let may_be_beside = need == Need::Paint || (need == Need::Settings && self.unseen);
+        self.beside = may_be_beside && self.growth().is_some_and(has_grown);
     }
 
     /// Whether the next growth to start grows unseen, beside vessels that stay meanwhile.
@@ -234,13 +273,14 @@ impl GrowthState {
     /// Whether other vessels will replace the present ones but have not started: a tissue or paint is being prepared,
     /// or the start waits for its turn. Until then the present ones pause, since their steps would be useless.
     pub(crate) fn awaits_others(&self) -> bool {
-        self.need != Need::Nothing || self.preparation.is_some() || (self.beside && self.successor.is_none())
+        self.next_need() != Need::Nothing || self.preparation.is_some() || (self.beside && self.successor.is_none())
     }
 
-    /// Drops the successors if the drawn vessels grew on the present paint, because a stroke was taken back.
+    /// Drops the successors if the drawn vessels grew on the present paint and with the present settings, because a
+    /// stroke was taken back.
     pub(crate) fn cancel_if_undone(&mut self) -> bool {
         let is_drawn = self.tissue.as_ref().is_some_and(|tissue| *tissue.paint == *self.paint());
-        let is_undone = self.beside && is_drawn;
+        let is_undone = self.beside && is_drawn && !self.other_settings;
         if is_undone {
             (self.successor, self.preparation, self.error) = (None, None, None);
             self.need = Need::Nothing;
@@ -296,7 +336,8 @@ impl GrowthState {
         let is_outdated = match (&start, self.need) {
             (_, Need::Tissue) => return None,
             (Ok(started), Need::Nothing | Need::Paint) => *started.tissue.paint != *self.paint(),
-            (Ok(_), Need::Growth) => true,
+            (Ok(started), Need::Settings) if self.unseen && self.beside => *started.tissue.paint != *self.paint(),
+            (Ok(_), Need::Settings | Need::Growth) => true,
             (Err(_), need) => need != Need::Nothing,
         };
         if !is_outdated {
@@ -318,6 +359,7 @@ impl GrowthState {
     /// Returns the warnings about the settings that have not been given before.
     pub(crate) fn start_now(&mut self, order: StartOrder) -> Result<Vec<GrowthWarning>, OrganGrowthError> {
         let before = if self.beside { None } else { self.growth.take() };
+        self.need = Need::Nothing;
         self.accept(order.carry_out_now(before))
     }
 
@@ -325,7 +367,8 @@ impl GrowthState {
     ///
     /// Returns the warnings about the settings that have not been given before.
     pub(crate) fn accept(&mut self, started: StartedGrowth) -> Result<Vec<GrowthWarning>, OrganGrowthError> {
-        self.need = Need::Nothing;
+        // Settings that have changed since wait for this growth.
+        self.need = if self.need == Need::Settings { Need::Settings } else { Need::Nothing };
         self.preparation = None;
         self.successor = None;
         self.error = None;
@@ -339,6 +382,7 @@ impl GrowthState {
             warnings
         } else {
             self.begin_trees();
+            self.other_settings = false;
             self.costs = Costs::default();
             self.tissue = Some(tissue);
             self.growth.insert(growth?).warnings()
@@ -454,7 +498,7 @@ mod tests {
     fn with_ball() -> (GrowthState, Preset) {
         let mut state = GrowthState::default();
         let wish = Preset { tissue: TissueShape::ball(1.0).into(), ..PresetName::Paper.load() };
-        state.follow(wish.clone(), 0, &TissuePaint::default(), SourceAssets::default());
+        state.follow((wish.clone(), 0, false), &TissuePaint::default(), SourceAssets::default());
         let shared = SharedTissues::default().get(&wish.tissue, SourceAssets::default());
         shared.fill(wish.tissue.prepare(&SourceData::default()).map_err(Into::into));
         state.await_tissue(shared);
@@ -485,7 +529,7 @@ mod tests {
         let (mut state, mut wish) = with_ball();
         assert!(state.is_prepared());
         wish.tissue = TissueShape::ball(2.0).into();
-        state.follow(wish, 0, &TissuePaint::default(), SourceAssets::default());
+        state.follow((wish, 0, false), &TissuePaint::default(), SourceAssets::default());
         assert!(state.poll_tissue().is_none());
         assert_eq!(state.next_need(), Need::Tissue);
     }
@@ -496,10 +540,10 @@ mod tests {
         let tissue = state.poll_tissue().expect("it is there").expect("a ball");
         let order = state.order(tissue, wish.clone(), 0);
         await_done(&mut state, |pace| order.carry_out(pace));
-        state.follow(wish, 1, &TissuePaint::default(), SourceAssets::default());
+        state.follow((wish, 1, false), &TissuePaint::default(), SourceAssets::default());
         assert_eq!(state.next_need(), Need::Nothing, "it waits for the tissue");
         assert!(state.poll_start().is_none());
-        assert_eq!(state.next_need(), Need::Growth, "on the tissue at hand");
+        assert_eq!(state.next_need(), Need::Settings, "on the tissue at hand");
         assert!(state.tissue().is_some() && state.growth().is_none());
     }
 

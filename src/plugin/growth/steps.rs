@@ -97,6 +97,7 @@ impl GrowthState {
         };
         growth.settle();
         (self.tissue, self.growth) = (Some(tissue), Some(growth));
+        self.other_settings = self.awaits_settings();
         self.begin_trees();
     }
 

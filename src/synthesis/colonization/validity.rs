@@ -90,6 +90,31 @@ pub enum SettingsWarning {
     },
 }
 
+impl SettingsWarning {
+    /// The system in question.
+    pub fn system(&self) -> VesselKind {
+        match *self {
+            Self::StepExceedsKill { system, .. }
+            | Self::InfluenceBelowKill { system, .. }
+            | Self::WidePerception { system, .. }
+            | Self::StrongDirection { system, .. }
+            | Self::BirthBelowKill { system, .. } => system,
+        }
+    }
+
+    /// Changes the settings of its system so that there is no cause for this warning any more: the value that it names
+    /// goes to its nearest limit.
+    pub fn mend(&self, settings: &mut SystemSettings) {
+        match self {
+            Self::StepExceedsKill { .. } => settings.step_length = settings.kill_distance,
+            Self::InfluenceBelowKill { .. } => settings.influence_distance = settings.kill_distance,
+            Self::WidePerception { .. } => settings.perception_angle = ColonizationSettings::WIDE_PERCEPTION,
+            Self::StrongDirection { .. } => settings.direction_weight = ColonizationSettings::STRONG_DIRECTION,
+            Self::BirthBelowKill { .. } => settings.node_birth_distance = settings.kill_distance,
+        }
+    }
+}
+
 impl fmt::Display for SettingsWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -158,6 +158,19 @@ impl VesselTree {
     pub fn statistics(&self) -> TreeStatistics {
         TreeStatistics::of(self)
     }
+
+    /// The angle between the two children of each bifurcation, in degrees, in the order of the nodes: for a histogram.
+    ///
+    /// Bifurcations with a child of no length are left out.
+    pub fn bifurcation_angles(&self) -> Vec<f64> {
+        let children = self.children();
+        let pairs = (0..self.len()).filter_map(|node| <&[u32; 2]>::try_from(children.of(node)).ok());
+        pairs.filter_map(|&[first, second]| self.angle_between(first, second)).collect()
+    }
+
+    fn angle_between(&self, first: u32, second: u32) -> Option<f64> {
+        angle_degrees(self.segment_vector(first as usize), self.segment_vector(second as usize))
+    }
 }
 
 /// Measures at nodes with two children.
@@ -179,8 +192,8 @@ impl Bifurcations {
                 continue;
             };
             count += 1;
+            angles.extend(tree.angle_between(first, second));
             let [first, second] = [first as usize, second as usize];
-            angles.extend(angle_degrees(tree.segment_vector(first), tree.segment_vector(second)));
             let [parent, a, b] = [node, first, second].map(|node| f64::from(tree.radii()[node]));
             area_ratios.push((a * a + b * b) / (parent * parent));
             asymmetries.push(a.min(b) / a.max(b));
