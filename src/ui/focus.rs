@@ -2,7 +2,10 @@
 
 use super::state::{PanelTool, VesselPanel};
 use bevy::prelude::*;
-use bevy_egui::EguiContext;
+use bevy_egui::{
+    EguiContext,
+    egui::{Context, Order},
+};
 
 /// Whether the pointer and the keys belong to the panel.
 ///
@@ -65,13 +68,19 @@ pub(super) fn note_focus(
     let (mut is_over, mut types) = (false, false);
     for mut context in &mut contexts {
         let context = context.get_mut();
-        is_over |= context.is_pointer_over_egui() || context.egui_is_using_pointer();
+        is_over |= is_over_window(context) || context.egui_is_using_pointer();
         types |= context.egui_wants_keyboard_input();
     }
     let is_down = buttons.get_pressed().next().is_some() || touches.iter().next().is_some();
     let cuts = panel.tool != PanelTool::Hand && buttons.pressed(MouseButton::Left);
     let next = focus.next(is_over, is_down, cuts, types);
     focus.set_if_neq(next);
+}
+
+/// Whether the pointer is over a window, or what one has opened.
+fn is_over_window(context: &Context) -> bool {
+    let layer = context.pointer_interact_pos().and_then(|pointer| context.layer_id_at(pointer));
+    layer.is_some_and(|layer| layer.order != Order::Background)
 }
 
 #[cfg(test)]

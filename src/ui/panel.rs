@@ -99,7 +99,7 @@ pub(super) fn show_panel(
     egui::Window::new("Vessels")
         .anchor(Align2::RIGHT_TOP, [-MARGIN, MARGIN])
         .resizable([true, false])
-        .default_width(WIDTH)
+        .default_size([WIDTH, height])
         .max_height(height)
         .vscroll(true)
         .show(context, |ui| {
