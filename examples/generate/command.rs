@@ -107,7 +107,7 @@ pub fn run(options: &Options, stdout: &mut impl Write, stop: &AtomicBool) -> Res
     if options.seed.checked_add(options.count - 1).is_none() {
         return Err(Failure::usage("--seed plus --count is more than a seed can be, 2^64 − 1"));
     }
-    if options.organ_seed.is_some() && Procedural::named(&options.tissue).is_none() {
+    if options.organ_seed.is_some() && Procedural::seed(options).is_none() {
         return Err(Failure::usage("--organ-seed is for colon, eye, kidney and liver; other tissues have no seed"));
     }
     let job = prepare(options)?;
@@ -185,7 +185,7 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
         generator,
         preset,
         tissue_name: options.tissue.display().to_string(),
-        organ_seed: Procedural::named(&options.tissue).map(|_| options.organ_seed.unwrap_or(0)),
+        organ_seed: Procedural::seed(options),
         preset_name,
         run,
         unit: options.unit,

@@ -3,7 +3,8 @@
 //! All files of a run begin with its name: tissue, mode, preset, and a hash of everything that its organs depend on
 //! besides their seeds. The same in full is the file with the run's plain name: a preset for `--settings`.
 
-use super::{Failure, Job, Mode, Options, Procedural};
+use super::procedural::Procedural;
+use super::{Failure, Job, Mode, Options};
 use bevy_vessels::synthesis::{
     generator::Generator,
     io::write_atomically,
@@ -44,7 +45,7 @@ impl Run {
         textures: Option<String>,
     ) -> Result<Self, Failure> {
         let mode = mode_of(&preset.tissue);
-        let organ_seed = Procedural::named(&options.tissue).map(|_| options.organ_seed.unwrap_or(0));
+        let organ_seed = Procedural::seed(options);
         let of_seed = organ_seed.map_or(String::new(), |seed| format!(" of seed {seed}"));
         let mut facts = vec![format!("tissue: {}{of_seed}, {}", options.tissue.display(), described(tissue, mesh))];
         facts.extend(mode.map(|mode| format!("mode: {}", mode.name())));

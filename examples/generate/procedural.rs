@@ -31,6 +31,11 @@ impl Procedural {
         }
     }
 
+    /// The seed of the organ that `--tissue` names, if any.
+    pub fn seed(options: &Options) -> Option<u64> {
+        Self::named(&options.tissue).map(|_| options.organ_seed.unwrap_or(0))
+    }
+
     /// The preset that is made for it.
     pub fn preset(self) -> PresetName {
         match self {

@@ -6,7 +6,7 @@
 //! vessels go radially from the straight muscles, those of the conjunctiva wind from the fornices; both thin out before
 //! the limbus. Calibres: arterioles of the conjunctiva from 6 to 12 µm, its larger vessels to 100 µm.
 
-use super::RecipeLayer;
+use super::layer::RecipeLayer;
 use crate::synthesis::{
     colonization::{ColonizationSettings, SystemSettings},
     organ::{Eye, smooth_step},

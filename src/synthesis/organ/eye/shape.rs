@@ -108,7 +108,7 @@ impl Shape {
 
     /// Height of the optic nerve's stump over the sclera.
     fn nerve_height(&self, point: Vec3) -> f32 {
-        let away = self.from_nerve(point);
+        let away = self.away_from_nerve(point);
         let [radius, edge] = [NERVE_RADIUS, NERVE_EDGE].map(|share| share * self.axial_length);
         NERVE_LENGTH * self.axial_length * (1.0 - smooth_step(radius - edge, radius + edge, away))
     }
@@ -116,11 +116,11 @@ impl Shape {
     /// Share of a point that belongs to the nerve and its sheath, not to the sclera.
     pub fn nerve_share(&self, point: Vec3) -> f32 {
         let [radius, edge] = [NERVE_RADIUS, NERVE_EDGE].map(|share| share * self.axial_length);
-        1.0 - smooth_step(radius, radius + 1.5 * edge, self.from_nerve(point))
+        1.0 - smooth_step(radius, radius + 1.5 * edge, self.away_from_nerve(point))
     }
 
     /// Distance of a point of the sclera from the nerve's middle, along the sclera; far away where it cannot matter.
-    fn from_nerve(&self, point: Vec3) -> f32 {
+    fn away_from_nerve(&self, point: Vec3) -> f32 {
         let direction = point.normalize_or(Vec3::Z);
         if direction.dot(self.nerve) < 0.0 {
             FRAC_PI_2 * self.along
