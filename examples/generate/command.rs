@@ -8,6 +8,7 @@ mod identity;
 mod mesh;
 mod options;
 mod organ;
+mod procedural;
 mod report;
 mod summary;
 
@@ -27,6 +28,7 @@ use bevy_vessels::synthesis::{
 use identity::Run;
 pub use options::Options;
 use options::{Format, Method, Mode, Shard, Unit};
+use procedural::Procedural;
 use std::fs::{self, Metadata};
 use std::io::Write;
 use std::num::NonZeroUsize;
@@ -76,6 +78,8 @@ struct Job {
     generator: Generator,
     preset: Preset,
     tissue_name: String,
+    /// The seed of the tissue's organ, if that is procedural.
+    organ_seed: Option<u64>,
     preset_name: String,
     run: Run,
     unit: Option<Unit>,
@@ -102,6 +106,9 @@ pub fn run(options: &Options, stdout: &mut impl Write, stop: &AtomicBool) -> Res
     let start = Instant::now();
     if options.seed.checked_add(options.count - 1).is_none() {
         return Err(Failure::usage("--seed plus --count is more than a seed can be, 2^64 − 1"));
+    }
+    if options.organ_seed.is_some() && Procedural::seed(options).is_none() {
+        return Err(Failure::usage("--organ-seed is for colon, eye, kidney and liver; other tissues have no seed"));
     }
     let job = prepare(options)?;
     let Shard { index, of } = options.shard;
@@ -178,6 +185,7 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
         generator,
         preset,
         tissue_name: options.tissue.display().to_string(),
+        organ_seed: Procedural::seed(options),
         preset_name,
         run,
         unit: options.unit,
@@ -249,6 +257,18 @@ fn find_preset(options: &Options) -> Result<(Preset, String), Failure> {
     Ok((preset, stem.to_string_lossy().into_owned()))
 }
 
+/// The mesh of an organ's file.
+fn read_mesh(path: &Path) -> Result<TriangleMesh, Failure> {
+    load_mesh(path).map_err(|error| match error {
+        MeshReadError::UnknownFormat { path } => Failure::Usage(format!(
+            "--tissue is {}; it must be disc, ball, box, colon, eye, kidney, liver, or a file that ends in .glb, .gltf \
+             or .obj",
+            path.display()
+        )),
+        other => Failure::run(other),
+    })
+}
+
 /// The tissue, and the mesh that it is made of, if of any.
 fn build_tissue(
     options: &Options,
@@ -280,14 +300,11 @@ fn build_tissue(
                 tissue.mode = TissueMode::Volume;
             }
             preset.tissue = tissue.into();
-            let mesh = load_mesh(&options.tissue).map_err(|error| match error {
-                MeshReadError::UnknownFormat { path } => Failure::Usage(format!(
-                    "--tissue is {}; it must be disc, ball, box, or a file that ends in .glb, .gltf or .obj",
-                    path.display()
-                )),
-                other => Failure::run(other),
-            })?;
-            data.mesh = Some(Arc::new(mesh));
+            let mode = preset.tissue.mode().unwrap_or_default();
+            data.mesh = Some(Arc::new(match Procedural::named(&options.tissue) {
+                Some(organ) => organ.make(options, mode, preset)?,
+                None => read_mesh(&options.tissue)?,
+            }));
         }
     }
     let prepared = preset.tissue.prepare(&data);

@@ -3,6 +3,7 @@
 //! All files of a run begin with its name: tissue, mode, preset, and a hash of everything that its organs depend on
 //! besides their seeds. The same in full is the file with the run's plain name: a preset for `--settings`.
 
+use super::procedural::Procedural;
 use super::{Failure, Job, Mode, Options};
 use bevy_vessels::synthesis::{
     generator::Generator,
@@ -44,7 +45,9 @@ impl Run {
         textures: Option<String>,
     ) -> Result<Self, Failure> {
         let mode = mode_of(&preset.tissue);
-        let mut facts = vec![format!("tissue: {}, {}", options.tissue.display(), described(tissue, mesh))];
+        let organ_seed = Procedural::seed(options);
+        let of_seed = organ_seed.map_or(String::new(), |seed| format!(" of seed {seed}"));
+        let mut facts = vec![format!("tissue: {}{of_seed}, {}", options.tissue.display(), described(tissue, mesh))];
         facts.extend(mode.map(|mode| format!("mode: {}", mode.name())));
         facts.push(format!("preset: {preset_name}"));
         facts.extend(changes(options).map(|changes| format!("changed: {changes}")));
@@ -64,6 +67,7 @@ impl Run {
         record.push('\n');
         let hash = format!("{:08x}", hash_bytes([&record]) >> 32);
         let stem = options.tissue.file_stem().unwrap_or(options.tissue.as_os_str()).to_string_lossy();
+        let stem = organ_seed.map_or_else(|| stem.to_string(), |seed| format!("{stem}-{seed}"));
         let parts = [Some(&*stem), mode.map(Mode::name), Some(preset_name), Some(&hash)];
         let name = parts.into_iter().flatten().map(file_name).collect::<Vec<_>>().join("_");
         Ok(Self { hash, mode, name, facts, record })

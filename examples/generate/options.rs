@@ -1,6 +1,7 @@
 //! The command's options.
 
 use super::bake::{Map, MapFormat};
+use super::procedural::Procedural;
 use bevy_vessels::synthesis::{
     generator::Generator, io::ObjOptions, preset::PresetName, surface::SurfaceSettings, tissue::TissueMode,
     units::Scale,
@@ -13,10 +14,13 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Parser)]
 #[command(name = "generate", version, args_override_self = true)]
 pub struct Options {
-    /// What to grow in: disc, ball or box, of diameter or edge 1 around the origin, or the mesh of an organ (GLB, glTF,
-    /// OBJ).
-    #[arg(long, default_value = "disc", value_name = "disc|ball|box|FILE")]
+    /// What to grow in: disc, ball or box, of diameter or edge 1 around the origin; a procedural colon, eye, kidney or
+    /// liver, in metres; or the mesh of an organ (GLB, glTF, OBJ).
+    #[arg(long, default_value = "disc", value_name = "disc|ball|box|colon|eye|kidney|liver|FILE")]
     pub tissue: PathBuf,
+    /// Seed of a procedural organ. All networks of a run grow in the same organ. Default: 0.
+    #[arg(long, value_name = "N")]
+    pub organ_seed: Option<u64>,
     /// Unit of the tissue's lengths, noted in all files. SWC files are then in micrometres, as other programs expect;
     /// all others stay in the tissue's lengths.
     #[arg(long)]
@@ -28,7 +32,8 @@ pub struct Options {
     /// How vessels grow. Without a preset or settings it chooses those to start from.
     #[arg(long)]
     pub method: Option<Method>,
-    /// Built-in settings, by name. Default: `paper`; with `--method cco` it is `cco-disc` in a disc, else `cco-ball`.
+    /// Built-in settings, by name. Default: `paper`, and for a procedural organ its own; with `--method cco` it is
+    /// `cco-disc` in a disc, else `cco-ball`.
     #[arg(long, conflicts_with = "settings", value_name = "NAME")]
     pub preset: Option<PresetName>,
     /// Your own preset, as a RON file.
@@ -166,7 +171,7 @@ impl Method {
     /// The settings to start from if none are named.
     pub fn preset(self, tissue: &Path) -> PresetName {
         match self {
-            Self::Colonization => PresetName::default(),
+            Self::Colonization => Procedural::named(tissue).map_or_else(PresetName::default, Procedural::preset),
             Self::Cco if tissue == "disc" => PresetName::CcoDisc,
             Self::Cco => PresetName::CcoBall,
         }

@@ -84,6 +84,7 @@ impl<'a> Grower<'a> {
         let hash = hash_trees(growth.trees().values().flatten().map(|grown| grown.tree));
         let mut line = Line {
             tissue: self.job.tissue_name.clone(),
+            organ_seed: self.job.organ_seed,
             mode: self.job.run.mode.map(|mode| mode.name().to_owned()),
             preset: self.job.preset_name.clone(),
             run: self.job.run.hash.clone(),

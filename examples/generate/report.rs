@@ -46,6 +46,9 @@ impl Samples {
 pub struct Line {
     /// The option `--tissue`.
     pub tissue: String,
+    /// The seed of a procedural organ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub organ_seed: Option<u64>,
     /// Where on a mesh vessels grow; null for a shape.
     pub mode: Option<String>,
     /// Name of the preset, or of the settings file without its extension.

@@ -65,6 +65,7 @@ pub mod pace;
 mod parallel;
 pub mod preset;
 pub mod random;
+pub mod recipe;
 pub mod roots;
 pub mod segment_index;
 pub mod space;

@@ -4,6 +4,7 @@ mod bake;
 #[path = "../../examples/generate/command.rs"]
 mod command;
 mod mesh;
+mod procedural;
 mod runs;
 
 use bevy_vessels::synthesis::{
@@ -363,7 +364,10 @@ fn wrong_usage_is_named_with_exit_code_2() {
         (&["--preset=nobody"], "there is no preset \"nobody\"; there are paper,"),
         (&["--preset=paper", "--settings=a.ron"], "cannot be used with"),
         (&["--format=png"], "--format"),
-        (&["--tissue=organ.stl"], "--tissue is organ.stl; it must be disc, ball, box, or a file"),
+        (
+            &["--tissue=organ.stl"],
+            "--tissue is organ.stl; it must be disc, ball, box, colon, eye, kidney, liver, or a file",
+        ),
         (&["--tissue=ball", "--mode=surface"], "--mode is for the mesh of an organ"),
     ] {
         let (code, message) = failure(arguments);

@@ -13,7 +13,7 @@ const PARTS: &str = "
 
 /// Floors of the pure half, the highest first. A room uses the floors below it, and on its own floor the rooms to its left.
 const FLOORS: &str = "
- products       haemodynamics  wound  instances  surface  texture  binding  io
+ products       haemodynamics  wound  instances  surface  texture  recipe  binding  io
  makers         growth  colonization  cco  generator  preset
  input          mesh  organ  tree  segment_index  tissue  roots
  ground         units  pace  exponential  random  parallel  space

@@ -1,5 +1,6 @@
 //! The user's placements of roots, and the generator's spacing.
 
+use crate::synthesis::organ::RootSites;
 use crate::synthesis::tree::{ByKind, VesselKind, VesselTree};
 use bevy_math::Vec3;
 use std::ops::Index;
@@ -78,6 +79,18 @@ impl Default for RootPlacements {
             portal_vein: RootPlacement::None,
             duct: RootPlacement::None,
         }
+    }
+}
+
+impl From<&RootSites> for RootPlacements {
+    /// Roots at the places of an organ, at the tissue's nearest points; none of the kinds that have no place.
+    fn from(sites: &RootSites) -> Self {
+        let [artery, vein, portal_vein, duct] =
+            [&sites.arterial, &sites.venous, &sites.portal, &sites.ductal].map(|points| match points.is_empty() {
+                true => RootPlacement::None,
+                false => RootPlacement::Nearest(points.clone()),
+            });
+        Self { artery, vein, portal_vein, duct }
     }
 }
 

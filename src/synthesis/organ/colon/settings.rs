@@ -1,7 +1,6 @@
 //! Settings of colons.
 
-use crate::synthesis::organ::OrganSettingsError;
-use std::ops::RangeInclusive;
+use crate::synthesis::organ::{OrganSettingsError, limits};
 
 /// Settings of a colon. The same settings give the same mesh, bit for bit.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,13 +79,7 @@ impl ColonSettings {
     /// # Errors
     /// The first value outside its limits.
     pub fn validate(&self) -> Result<(), OrganSettingsError> {
-        let check = |name, value: f32, range: RangeInclusive<f32>, limits| {
-            if range.contains(&value) {
-                Ok(())
-            } else {
-                Err(OrganSettingsError { organ: "colon", name, value, limits })
-            }
-        };
+        let check = limits("colon");
         let calibre = self.calibre;
         check("width", self.width, 0.05..=5.0, "0.05 to 5 m")?;
         check("calibre", calibre, 0.04 * self.width..=0.25 * self.width, "0.04 to 0.25 of the width")?;
