@@ -39,16 +39,20 @@
 mod atlas;
 mod bake;
 mod bins;
+mod bytes;
 mod canvas;
 mod cones;
 mod error;
 mod face;
 mod gauss;
+mod groups;
 mod gutter;
 mod limits;
 mod look;
 mod maps;
+mod meeting;
 mod mips;
+mod owners;
 mod paint;
 mod profile;
 mod report;
@@ -61,10 +65,9 @@ mod texels;
 #[cfg(feature = "unwrap")]
 mod unwrap;
 mod welds;
-mod window;
 
 pub use bake::Bake;
-pub use canvas::{Canvas, CanvasAttributes};
+pub use canvas::{Canvas, CanvasAttributes, VertexColors};
 pub use cones::Layer;
 pub use error::{BakeError, BakeWarning};
 pub use look::VesselLook;
