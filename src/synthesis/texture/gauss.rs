@@ -1,6 +1,6 @@
 //! Integrals of the normal distribution.
 
-use std::f32::consts::LOG2_E;
+use std::f32::consts::{LN_2, LOG2_E};
 
 /// Standard deviations beyond which an edge is not seen: 1 − Φ is below 1.4e-3 there, a tenth of a level of 8 bits for a
 /// vessel with a quarter of the contrast.
@@ -10,7 +10,7 @@ const REACH: f32 = 6.0;
 /// Sums with it are rounded to whole numbers, which are their lowest bits.
 const ROUNDING: f32 = 12_582_912.0;
 /// (ln 2)ⁿ/n!: the series of 2^x.
-const POWERS: [f32; 7] = [1.0, 0.693_147_2, 0.240_226_5, 0.055_504_11, 0.009_618_129, 0.001_333_355_8, 0.000_154_035_3];
+const POWERS: [f32; 7] = [1.0, LN_2, 0.240_226_5, 0.055_504_11, 0.009_618_129, 0.001_333_355_8, 0.000_154_035_3];
 /// Abramowitz & Stegun, "Handbook of Mathematical Functions" (1964), 26.2.17.
 const TAIL: [f32; 5] = [0.319_381_53, -0.356_563_78, 1.781_477_9, -1.821_255_9, 1.330_274_5];
 const TAIL_SCALE: f32 = 0.231_641_9;

@@ -133,10 +133,10 @@ impl Meetings {
     #[inline(always)]
     fn sink(&mut self, cone: &Cone, look: &VesselLook, below: &Lanes) {
         let limit = 1.0 / (cone.max_depth * cone.max_depth);
-        for k in 0..LANES {
+        for (k, below) in below.iter().enumerate() {
             let radius = cone.start_radius + cone.widening * self.share[k];
-            let above = if below[k] < 0.0 { below[k] } else { 0.0 };
-            let depth = (below[k] - above) + look.depth * radius;
+            let above = if *below < 0.0 { *below } else { 0.0 };
+            let depth = (below - above) + look.depth * radius;
             // Above the surface it fades by its height, below by its depth.
             let not_above = 1.0 - above * above * limit;
             let left = 1.0 - depth * depth * limit;
@@ -162,7 +162,7 @@ impl Meetings {
         let mound = if look.bump == 0.0 { 0.0 } else { VesselLook::MOUND };
         let texels = self.texel_blur(spots);
         let mut raised = ZERO;
-        for k in 0..LANES {
+        for (k, raised) in raised.iter_mut().enumerate() {
             let radius = self.radius[k];
             let (spread, most_spread) = (look.scatter * self.depth[k], most * radius);
             let is_scattered = spread < most_spread;
@@ -173,13 +173,12 @@ impl Meetings {
             self.widening_blur[k] = look.blur + if is_scattered { look.scatter * look.depth } else { most };
             self.own_blur[k] = own;
             self.sigma[k] = variance;
-            raised[k] = variance + mound * mound * radius * radius;
+            *raised = variance + mound * mound * radius * radius;
         }
         self.distance = roots(&self.distance);
         self.sigma = roots(&self.sigma);
-        let raised = roots(&raised);
-        for k in 0..LANES {
-            let is_seen = self.distance[k] <= self.radius[k] + SEEN * raised[k];
+        for (k, raised) in roots(&raised).into_iter().enumerate() {
+            let is_seen = self.distance[k] <= self.radius[k] + SEEN * raised;
             self.visible[k] = if is_seen { self.visible[k] } else { 0.0 };
         }
     }

@@ -91,10 +91,10 @@ impl Sight {
         }
         let Some(last) = self.layers.last_mut() else { return };
         let [start, end] = cone.shade;
-        for k in 0..LANES {
-            let is_more = cover[k] > last.cover[k];
+        for (k, cover) in cover.into_iter().enumerate() {
+            let is_more = cover > last.cover[k];
             let shade = start + (end - start) * meetings.share[k];
-            last.cover[k] = if is_more { cover[k] } else { last.cover[k] };
+            last.cover[k] = if is_more { cover } else { last.cover[k] };
             last.depth[k] = if is_more { meetings.depth[k] } else { last.depth[k] };
             last.shade[k] = if is_more { shade } else { last.shade[k] };
         }
