@@ -18,9 +18,9 @@ pub fn mark(kind: MapKind) -> f32 {
     }
 }
 
-/// Edges that two triangles share by position, but not by texture coordinates: the vertices of both sides, in one order.
-/// A triangle whose texture coordinates have no area shows all of its edges at one place or line of the texture, where no
-/// picture can be that of the other side.
+/// Edges that two triangles share by position, but not by texture coordinates: the vertices of both sides, in one
+/// order. A triangle whose texture coordinates have no area shows all of its edges at one place or line of the texture,
+/// where no picture can be that of the other side.
 pub fn seams(canvas: &Canvas) -> Vec<[[usize; 2]; 2]> {
     let key = |vertex: usize| canvas.mesh().positions()[vertex].to_array().map(|value| (value + 0.0).to_bits());
     let mut edges: BTreeMap<[[u32; 3]; 2], Vec<[usize; 2]>> = BTreeMap::new();

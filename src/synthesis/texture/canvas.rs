@@ -46,15 +46,15 @@ pub struct CanvasAttributes {
     pub colors: Option<VertexColors>,
 }
 
-/// Colours per vertex, by which the base of a texture is multiplied: that of each texel by what lies between the corners
-/// of its triangle.
+/// Colours per vertex, by which the base of a texture is multiplied: that of each texel by what lies between the
+/// corners of its triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VertexColors {
     /// The colours, linear sRGB. Limits: at least 0.
     pub colors: Vec<Vec3>,
-    /// Whether the renderer multiplies the texture by them, too, as Bevy does for meshes with colours. Then they are not
-    /// in the map of colours, and those of vessels are divided by them, so that both are right on the screen, as far as
-    /// such a product can be as bright as the vessels. Otherwise the base in the map is already multiplied.
+    /// Whether the renderer multiplies the texture by them, too, as Bevy does for meshes with colours. Then they are
+    /// not in the map of colours, and those of vessels are divided by them, so that both are right on the screen, as
+    /// far as such a product can be as bright as the vessels. Otherwise the base in the map is already multiplied.
     pub are_drawn: bool,
 }
 

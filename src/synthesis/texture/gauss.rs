@@ -2,8 +2,8 @@
 
 use std::f32::consts::{LN_2, LOG2_E};
 
-/// Standard deviations beyond which an edge is not seen: 1 − Φ is below 1.4e-3 there, a tenth of a level of 8 bits for a
-/// vessel with a quarter of the contrast.
+/// Standard deviations beyond which an edge is not seen: 1 − Φ is below 1.4e-3 there, a tenth of a level of 8 bits for
+/// a vessel with a quarter of the contrast.
 pub(super) const SEEN: f32 = 3.0;
 /// Standard deviations beyond which the distribution is as at this one: 1 − Φ is 1e-9 there.
 const REACH: f32 = 6.0;
@@ -19,8 +19,8 @@ const PEAK: f32 = 0.398_942_3;
 
 /// Φ(x) and its derivative φ(x). Φ is off by less than 5e-7.
 ///
-/// Without branches, so that a loop over points works on several at a time, and from the basic operations alone, so that
-/// it has the same bits everywhere.
+/// Without branches, so that a loop over points works on several at a time, and from the basic operations alone, so
+/// that it has the same bits everywhere.
 #[inline(always)]
 pub(super) fn gauss(x: f32) -> [f32; 2] {
     let far = if x.abs() < REACH { x.abs() } else { REACH };

@@ -65,8 +65,8 @@ impl Groups {
         }
     }
 
-    /// For each group, the distance from the axis of a segment up to which it can be seen from there; 0 where it cannot be
-    /// seen at all. `start` is where it begins, from the origin of the tile.
+    /// For each group, the distance from the axis of a segment up to which it can be seen from there; 0 where it cannot
+    /// be seen at all. `start` is where it begins, from the origin of the tile.
     #[inline(always)]
     pub fn reaches(&self, cone: &Cone, start: Vec3, look: &VesselLook) -> Lanes {
         let (along, mut reaches) = (cone.along, ZERO);
@@ -108,5 +108,62 @@ impl Groups {
             reaches[k] = if is_near { reach } else { 0.0 };
         }
         reaches
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cones::{Cones, Layer};
+    use super::super::meeting::Meetings;
+    use super::super::settings::BakeSettings;
+    use super::*;
+    use crate::synthesis::{
+        pace::{Pace, at_once},
+        random::Stream,
+        tree::{NO_PARENT, VesselTree},
+    };
+    use rand::RngExt;
+
+    #[test]
+    fn what_a_group_cannot_see_none_of_its_texels_sees() {
+        let mut rng = Stream::Statistics.rng(11);
+        let mut random = |scale: f32| Vec3::from_array(std::array::from_fn(|_| rng.random_range(-scale..scale)));
+        let (mut positions, mut parents, mut radii) = (Vec::new(), Vec::new(), Vec::new());
+        for segment in 0..400u32 {
+            // Near a ball of radius 1.
+            let start = random(1.0).normalize_or(Vec3::X) * (1.0 - 0.05 * random(1.0).x);
+            positions.extend([start, start + random(0.2)]);
+            parents.extend([NO_PARENT, 2 * segment]);
+            radii.extend([0.03 + random(0.02).x, 0.03 + random(0.02).x]);
+        }
+        let tree = VesselTree::from_arrays(positions, parents, radii).expect("a tree");
+        let mut seen = 0;
+        for look in
+            [VesselLook::default(), VesselLook { max_depth: 0.3, blur: 1.0, bump: 0.0, ..VesselLook::default() }]
+        {
+            let layers = [Layer { tree: &tree, look: look.clone() }];
+            let cones = at_once(Cones::of(&layers, &BakeSettings::default(), &Pace::default())).expect("cones");
+            for _ in 0..200 {
+                let (texel, middle) = (0.02, random(1.0).normalize_or(Vec3::X));
+                let (mut spots, mut groups) = (Spots::NOWHERE, Groups::EMPTY);
+                for k in 0..LANES {
+                    let at = (middle + random(2.0 * texel)).normalize_or(Vec3::X);
+                    for axis in 0..3 {
+                        (spots.at[axis][k], spots.normal[axis][k]) = (at[axis], at[axis]);
+                        spots.footprint[axis][k] = 0.25 * texel * texel;
+                    }
+                }
+                groups.set(0, &spots, &[true; LANES], 0.5 * texel * 3.0f32.sqrt());
+                for cone in &cones.cones {
+                    let reach = groups.reaches(cone, cone.start, &look)[0];
+                    let Some(meetings) = Meetings::of(cone, cone.start, 1.0e3, &look, &spots) else { continue };
+                    for k in (0..LANES).filter(|&k| meetings.visible[k] > 0.0) {
+                        assert!(meetings.distance[k] <= reach, "{} for {reach}", meetings.distance[k]);
+                        seen += 1;
+                    }
+                }
+            }
+        }
+        assert!(seen > 1000, "{seen}");
     }
 }

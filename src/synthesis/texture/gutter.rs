@@ -1,7 +1,7 @@
 //! Fills the gutters between charts: every texel that belongs to none takes the values of the nearest one that does.
 //!
-//! Jump flooding (Rong & Tan 2006) finds the nearest texel nearly always, in log n passes. This finds it always, in two:
-//! along columns, then along rows as the lower envelope of parabolas (Felzenszwalb & Huttenlocher, "Distance
+//! Jump flooding (Rong & Tan 2006) finds the nearest texel nearly always, in log n passes. This finds it always, in
+//! two: along columns, then along rows as the lower envelope of parabolas (Felzenszwalb & Huttenlocher, "Distance
 //! transforms of sampled functions", 2012).
 
 use super::maps::Level;

@@ -44,8 +44,8 @@ impl Spots {
 /// A segment as it is seen from some points.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meetings {
-    /// Place on the line of the axis that is nearest to the point in the plane, as a share of the segment, and that place
-    /// cut at the ends.
+    /// Place on the line of the axis that is nearest to the point in the plane, as a share of the segment, and that
+    /// place cut at the ends.
     free: Lanes,
     pub share: Lanes,
     /// From the point to the latter, in the plane.

@@ -15,8 +15,8 @@ const WITHIN: f32 = 0.01;
 pub(super) struct Owners {
     /// For each texel, the place of its triangle among those of the tile.
     owners: Vec<u32>,
-    /// For each texel that is in no triangle, the squared distance from the nearest one; below 0 for the others. Empty in
-    /// tiles without a border.
+    /// For each texel that is in no triangle, the squared distance from the nearest one; below 0 for the others. Empty
+    /// in tiles without a border.
     distances: Vec<f64>,
 }
 

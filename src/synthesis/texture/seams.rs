@@ -1,13 +1,13 @@
 //! Makes all sides of every seam look the same.
 //!
 //! Along the border of a chart a sampler interpolates between texels of that chart, and on the other side of the edge
-//! between texels of another, which lie at other places of the surface. Both are exact; what lies between them is off by
-//! an eighth of the curvature in texels. No choice of samples makes two grids agree on details as small as a texel:
+//! between texels of another, which lie at other places of the surface. Both are exact; what lies between them is off
+//! by an eighth of the curvature in texels. No choice of samples makes two grids agree on details as small as a texel:
 //! vessels have to be smooth along the seam for both to show the same. So where there is a step, the texels that the
 //! seam's points see become the mean of what all sides show there: a blur by half a texel, along the seam and nowhere
 //! else. A few times are enough for the finest vessels. What is left, mainly where seams meet, is closed by adding to
-//! each texel what its points miss: least squares, as in Sylvan, "Fixing texture seams with linear least-squares" (2014).
-//! Faint or wide vessels are left as they are.
+//! each texel what its points miss: least squares, as in Sylvan, "Fixing texture seams with linear least-squares"
+//! (2014). Faint or wide vessels are left as they are.
 //!
 //! All corners of the charts that meet at a vertex are one point. So the triangles around a pole, where a whole row of
 //! the texture is one place, agree too.
@@ -197,9 +197,9 @@ impl Points {
         }
     }
 
-    /// Changes texels until all sides agree. Returns those that have changed. `frames` turn what each view sees into what
-    /// can be compared; without any, it can be as it is. `step` measures the step between the least and the greatest
-    /// that a point shows.
+    /// Changes texels until all sides agree. Returns those that have changed. `frames` turn what each view sees into
+    /// what can be compared; without any, it can be as it is. `step` measures the step between the least and the
+    /// greatest that a point shows.
     async fn agree(
         &self,
         mut values: Vec<Vec3>,
@@ -271,8 +271,8 @@ impl Points {
         &self.seeing[from..to]
     }
 
-    /// For each view, the tangents as a renderer interpolates them, turned so that all views of a point have one normal.
-    /// So at a sharp edge the relief runs on, as if the surface were laid flat.
+    /// For each view, the tangents as a renderer interpolates them, turned so that all views of a point have one
+    /// normal. So at a sharp edge the relief runs on, as if the surface were laid flat.
     fn frames(&self, canvas: &Canvas) -> Vec<Frame> {
         let mut frames = Vec::with_capacity(self.views.len());
         for point in 0..self.starts.len() - 1 {

@@ -53,8 +53,8 @@ impl Sight {
         *self = Self { layers, ..Self::default() };
     }
 
-    /// Looks at a segment, with its start from the origin of the texels. `reach` is the distance from its axis up to which
-    /// it can be seen. Segments have to come by rising number.
+    /// Looks at a segment, with its start from the origin of the texels. `reach` is the distance from its axis up to
+    /// which it can be seen. Segments have to come by rising number.
     #[inline]
     pub fn add(
         &mut self,
@@ -129,8 +129,8 @@ impl Sight {
         self.layers.iter().any(|seen| seen.cover[k] > 0.0)
     }
 
-    /// Colour and roughness of a texel over those of the base: the deepest network first. The vessels' colours are divided
-    /// by `filter`.
+    /// Colour and roughness of a texel over those of the base: the deepest network first. The vessels' colours are
+    /// divided by `filter`.
     pub fn over(&self, k: usize, cones: &Cones, base: (Vec3, f32), filter: Vec3) -> (Vec3, f32) {
         let mut mixed = base;
         let mut last = None;

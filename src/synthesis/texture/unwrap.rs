@@ -13,8 +13,8 @@ const PADDING: u32 = 4;
 impl Canvas {
     /// A canvas of a mesh that is cut into charts, each of which is laid flat, for a texture of so many texels.
     ///
-    /// Vertices along the cuts are there twice; [`sources`](Self::sources) says which vertex of the mesh each was. A mesh
-    /// with `normals`, one per vertex, keeps them; otherwise they are smooth.
+    /// Vertices along the cuts are there twice; [`sources`](Self::sources) says which vertex of the mesh each was. A
+    /// mesh with `normals`, one per vertex, keeps them; otherwise they are smooth.
     ///
     /// # Errors
     /// A size out of its limits, and normals that are not one per vertex.
@@ -50,8 +50,8 @@ impl Canvas {
     }
 }
 
-/// Triangles of the largest charts, if they are all of one size. Larger charts have fewer borders, and take longer to lay
-/// flat: each triangle the longer, the wider its chart.
+/// Triangles of the largest charts, if they are all of one size. Larger charts have fewer borders, and take longer to
+/// lay flat: each triangle the longer, the wider its chart.
 const CHART_TRIANGLES: f64 = 1000.0;
 
 /// Positions as they were, triangles of new vertices, and for each of these its old vertex and texture coordinates.
