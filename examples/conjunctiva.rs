@@ -50,7 +50,10 @@ fn main() -> AppExit {
         .add_plugins(StudioPlugin { args: studio, title: "Conjunctiva", help: "N  next seed", more_help: "" })
         .insert_resource(args)
         .add_systems(Startup, begin)
-        .add_systems(Update, (show.run_if(resource_exists::<Painting>), next_seed.run_if(resource_equals(View::Window))))
+        .add_systems(
+            Update,
+            (show.run_if(resource_exists::<Painting>), next_seed.run_if(resource_equals(View::Window))),
+        )
         .run()
 }
 
@@ -141,9 +144,11 @@ fn show(
         let mut globe: Mesh = eye.globe.clone().into();
         // The texture has the colours.
         globe.remove_attribute(Mesh::ATTRIBUTE_COLOR);
-        for (name, mesh, material) in
-            [("sclera", globe, sclera), ("iris", eye.iris.clone().into(), iris), ("cornea", eye.cornea.clone().into(), cornea)]
-        {
+        for (name, mesh, material) in [
+            ("sclera", globe, sclera),
+            ("iris", eye.iris.clone().into(), iris),
+            ("cornea", eye.cornea.clone().into(), cornea),
+        ] {
             let drawn = (Mesh3d(meshes.add(mesh)), MeshMaterial3d(materials.add(material)), place);
             let mut part = commands.spawn((Part, Name::new(name), drawn));
             if name == "cornea" {

@@ -13,36 +13,6 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// A map of the texture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Map {
-    /// Colour.
-    Albedo,
-    /// Normals in the tangents of the mesh.
-    Normal,
-    /// Height over the surface.
-    Height,
-    /// Roughness, packed as in glTF.
-    Roughness,
-    /// Numbers of vessels.
-    Id,
-    /// Depth below the surface.
-    Depth,
-}
-
-impl Map {
-    fn kind(self) -> MapKind {
-        match self {
-            Self::Albedo => MapKind::Albedo,
-            Self::Normal => MapKind::Normal,
-            Self::Height => MapKind::Height,
-            Self::Roughness => MapKind::Roughness,
-            Self::Id => MapKind::Id,
-            Self::Depth => MapKind::Depth,
-        }
-    }
-}
-
 /// A format of textures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MapFormat {
@@ -73,7 +43,7 @@ impl Painting {
     /// asked for.
     pub fn new(options: &Options, mesh: Option<&TriangleMesh>) -> Result<Option<Self>, Failure> {
         let Some(size) = options.bake else { return Ok(None) };
-        let maps = options.maps.iter().map(|map| map.kind()).collect();
+        let maps = options.maps.iter().copied().collect();
         let settings = BakeSettings { size, maps, ..BakeSettings::default() };
         settings.validate().map_err(|error| Failure::Usage(format!("--bake {size}: {error}")))?;
         let mesh = mesh

@@ -1,12 +1,15 @@
 //! The command's options.
 
-use super::bake::{Map, MapFormat};
+use super::bake::MapFormat;
 use super::procedural::Procedural;
 use bevy_vessels::synthesis::{
-    generator::Generator, io::ObjOptions, preset::PresetName, surface::SurfaceSettings, tissue::TissueMode,
-    units::Scale,
+    generator::Generator, io::ObjOptions, preset::PresetName, surface::SurfaceSettings, texture::MapKind,
+    tissue::TissueMode, units::Scale,
 };
-use clap::{Parser, ValueEnum, builder::TypedValueParser};
+use clap::{
+    Parser, ValueEnum,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -101,8 +104,9 @@ pub struct Options {
     #[arg(long, value_name = "SIZE")]
     pub bake: Option<u32>,
     /// The textures to bake.
-    #[arg(long, value_delimiter = ',', default_value = "albedo,normal", value_name = "MAP", requires = "bake")]
-    pub maps: Vec<Map>,
+    #[arg(long, value_delimiter = ',', default_value = "albedo,normal", value_name = "MAP", requires = "bake",
+        value_parser = map_kinds())]
+    pub maps: Vec<MapKind>,
     /// Format of the textures.
     #[arg(long, default_value = "png", requires = "bake")]
     pub map_format: MapFormat,
@@ -113,6 +117,11 @@ pub struct Options {
 
 fn obj_sides() -> impl TypedValueParser<Value = u32> {
     clap::value_parser!(u32).range(i64::from(ObjOptions::MIN_SIDES)..=i64::from(ObjOptions::MAX_SIDES))
+}
+
+fn map_kinds() -> impl TypedValueParser<Value = MapKind> {
+    let by_name = |name: String| MapKind::ALL.into_iter().find(|kind| kind.name() == name);
+    PossibleValuesParser::new(MapKind::ALL.map(MapKind::name)).try_map(move |name| by_name(name).ok_or("no such map"))
 }
 
 /// A unit of lengths.

@@ -1,13 +1,13 @@
 //! What is wrong with an input is said, with the value and the remedy; and what comes out is the same everywhere.
 
-use crate::meshes::{baked, cube, plain, square, vessel};
+use crate::meshes::{baked, cube, linear, plain, square, vessel};
 use bevy_math::{Vec2, Vec3};
 use bevy_vessels::synthesis::{
     mesh::TriangleMesh,
     pace::{Pace, at_once},
     texture::{
         Bake, BakeError, BakeSettings, BakeWarning, BaseImage, Canvas, CanvasAttributes, Layer, MapKind, Maps,
-        VesselLook,
+        VertexColors, VesselLook,
     },
     tree::{VesselKind, VesselTree},
 };
@@ -73,6 +73,46 @@ fn thin_and_overlapping_charts_are_warned_of() {
     let canvas = Canvas::new(mesh, CanvasAttributes { uvs: stacked, ..CanvasAttributes::default() }).expect("a canvas");
     let bake = baked(&canvas, &[&tree], &plain(), 128, &[MapKind::Albedo]);
     assert!(bake.report.warnings.iter().any(|warning| matches!(warning, BakeWarning::Overlaps { .. })));
+}
+
+#[test]
+fn colours_per_vertex_are_part_of_the_base() {
+    let mesh = square(8);
+    let color = |at: &Vec3| Vec3::new(0.25 + 0.5 * at.x, 0.4, 0.9 - 0.6 * at.y);
+    let uvs = mesh.uvs().expect("texture coordinates").to_vec();
+    let tree = vessel(&[Vec3::new(0.2, 0.5, 0.0), Vec3::new(0.8, 0.5, 0.0)], 0.1);
+    // Dark enough that a renderer's product reaches it everywhere.
+    let look = VesselLook { strength: 0.7, thin_color: [0.1, 0.05, 0.2], wide_color: [0.1, 0.05, 0.2], ..plain() };
+    let settings = BakeSettings { size: 64, base_color: [0.8, 0.6, 0.5], ..BakeSettings::default() };
+    let albedo = |are_drawn: Option<bool>| {
+        let colors = mesh.positions().iter().map(color).collect::<Vec<_>>();
+        let colors = are_drawn.map(|are_drawn| VertexColors { colors, are_drawn });
+        let attributes = CanvasAttributes { uvs: uvs.clone(), colors, ..CanvasAttributes::default() };
+        let canvas = Canvas::new(mesh.clone(), attributes).expect("a canvas");
+        let layers = [Layer { tree: &tree, look: look.clone() }];
+        Bake::new(&canvas, &layers, None, &settings).expect("a bake").maps.swap_remove(0).levels.swap_remove(0)
+    };
+    let [without, baked, drawn] = [None, Some(false), Some(true)].map(albedo);
+    let mut covered = 0;
+    for texel in 0..64 * 64 {
+        let at = Vec3::new((texel % 64) as f32 + 0.5, 63.5 - (texel / 64) as f32, 0.0) / 64.0;
+        for (channel, tint) in color(&at).to_array().into_iter().enumerate() {
+            let byte = 4 * texel + channel;
+            let [plain, in_map, by_renderer] = [&without, &baked, &drawn].map(|map| linear(map[byte]));
+            let (base, vessel) = (settings.base_color[channel], look.thin_color[channel]);
+            let alpha = (base - plain) / (base - vessel);
+            let exact = base * tint * (1.0 - alpha) + vessel * alpha;
+            // Two bytes at most, in linear light.
+            let off = 0.02 * (1.0 + 1.0 / tint);
+            assert!((in_map - exact).abs() < off, "{in_map} for {exact}");
+            assert!((by_renderer * tint - exact).abs() < off, "{by_renderer} times {tint} for {exact}");
+            covered += usize::from(alpha > 0.5);
+        }
+    }
+    assert!(covered > 500);
+    let bad = VertexColors { colors: vec![Vec3::NEG_ONE; uvs.len()], are_drawn: true };
+    let attributes = CanvasAttributes { uvs, colors: Some(bad), ..CanvasAttributes::default() };
+    assert_eq!(Canvas::new(mesh, attributes).err(), Some(BakeError::BadAttribute { what: "colour", vertex: 0 }));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::synthesis::{
     pace::Pace,
     texture::{
         Bake, BakeReport, BakeSettings, BakedMap, BaseImage, Canvas, CanvasAttributes, Layer, MapKind, TexelFormat,
-        VesselLook,
+        VertexColors, VesselLook,
     },
     tree::VesselTree,
 };
@@ -39,8 +39,8 @@ pub(super) struct Source {
 pub(super) struct Shading {
     pub normals: Option<Vec<Vec3>>,
     pub tangents: Option<Vec<Vec4>>,
-    /// The mean of its vertices' colours, by which a renderer multiplies the texture.
-    pub tint: Option<Vec3>,
+    /// Colours of its vertices, by which a renderer multiplies the texture.
+    pub colors: Option<Vec<Vec3>>,
 }
 
 /// The maps of an organ.
@@ -52,15 +52,14 @@ pub(super) struct Baked {
 impl Shading {
     /// That of a mesh; one that is deformed has normals and tangents of its own.
     pub fn of(mesh: &Mesh, is_deformed: bool) -> Self {
-        let tint = match mesh.try_attribute(Mesh::ATTRIBUTE_COLOR) {
-            Ok(VertexAttributeValues::Float32x4(colors)) if !colors.is_empty() => {
-                let sum: Vec3 = colors.iter().map(|&[red, green, blue, _]| Vec3::new(red, green, blue)).sum();
-                Some(sum / colors.len() as f32).filter(|mean| mean.is_finite())
+        let colors = match mesh.try_attribute(Mesh::ATTRIBUTE_COLOR) {
+            Ok(VertexAttributeValues::Float32x4(colors)) => {
+                Some(colors.iter().map(|&[red, green, blue, _]| Vec3::new(red, green, blue)).collect())
             }
             _ => None,
         };
         if is_deformed {
-            return Self { tint, ..Self::default() };
+            return Self { colors, ..Self::default() };
         }
         let normals = mesh.try_attribute(Mesh::ATTRIBUTE_NORMAL).ok().and_then(VertexAttributeValues::as_float3);
         let tangents = match mesh.try_attribute(Mesh::ATTRIBUTE_TANGENT) {
@@ -70,7 +69,7 @@ impl Shading {
         Self {
             normals: normals.map(|normals| normals.iter().copied().map(Vec3::from).collect()),
             tangents: tangents.map(|tangents| tangents.iter().copied().map(Vec4::from).collect()),
-            tint,
+            colors,
         }
     }
 }
@@ -91,11 +90,11 @@ pub(super) async fn bake(source: Source, pace: Pace) -> Result<Baked, VesselText
     let uvs = mesh.uvs.take();
     let mesh = mesh.check(&pace.part(0.0..0.05)).await?;
     let uvs = uvs.ok_or(crate::synthesis::texture::BakeError::NoUvs)?;
-    let attributes = CanvasAttributes { uvs, normals: shading.normals, tangents: shading.tangents };
+    let Shading { normals, tangents, colors } = shading;
+    let colors = colors.map(|colors| VertexColors { colors, are_drawn: true });
+    let attributes = CanvasAttributes { uvs, normals, tangents, colors };
     let canvas = Canvas::new_paced(mesh, attributes, &pace.part(0.05..0.15)).await?;
-    let tint = shading.tint;
-    let layers: Vec<Layer<'_>> =
-        vessels.iter().map(|(tree, look)| Layer { tree, look: untinted(look.clone(), tint) }).collect();
+    let layers: Vec<Layer<'_>> = vessels.iter().map(|(tree, look)| Layer { tree, look: look.clone() }).collect();
     let baked = Bake::new_paced(&canvas, &layers, base.as_ref(), &settings, &pace.part(0.15..0.95)).await?;
     let Bake { maps, report } = baked;
     let sampler = sampler(report.repeats);
@@ -106,16 +105,6 @@ pub(super) async fn bake(source: Source, pace: Pace) -> Result<Baked, VesselText
     }
     pace.rest(1.0).await;
     Ok(Baked { images, report })
-}
-
-/// A look whose colours are right after a renderer has multiplied them by those of the vertices.
-fn untinted(mut look: VesselLook, tint: Option<Vec3>) -> VesselLook {
-    let Some(tint) = tint else { return look };
-    for color in [&mut look.thin_color, &mut look.wide_color, &mut look.deep_color] {
-        let share = Vec3::from(*color) / tint.max(Vec3::splat(f32::MIN_POSITIVE));
-        *color = share.clamp(Vec3::ZERO, Vec3::ONE).to_array();
-    }
-    look
 }
 
 /// The picture between the vessels.

@@ -39,6 +39,8 @@ pub(super) struct Atlas {
     /// Variance of the blur of a texel of a texture of size 1, the same for all vertices at one position.
     pub footprints: Vec<Tensor>,
     pub seams: Vec<Seam>,
+    /// Where seams meet: for each position, in rising order, the vertices there that differ in texture coordinates.
+    pub seam_corners: Vec<[u32; 2]>,
     /// Number of charts.
     pub charts: usize,
     /// For each chart, how wide it is, in textures.
@@ -58,8 +60,9 @@ impl Atlas {
         let (smooth, footprints, side) = surface(canvas, &pace.part(0.5..0.9)).await;
         let widths = widths(canvas, &edges, &chart_of, charts);
         let repeats = repeats(canvas, &placements, &edges.seams);
+        let seam_corners = seam_corners(canvas, &edges.seams);
         pace.rest(1.0).await;
-        Self { placements, smooth, footprints, seams: edges.seams, charts, widths, repeats, side }
+        Self { placements, smooth, footprints, seams: edges.seams, seam_corners, charts, widths, repeats, side }
     }
 
     /// Warns of charts too thin for a size.
@@ -293,13 +296,22 @@ fn repeats(canvas: &Canvas, placements: &[Placement], seams: &[Seam]) -> [bool; 
         (0..2).for_each(|axis| repeats[axis] |= placement.shift[axis] != 0);
     }
     for seam in seams {
-        let [one, other] = seam.ends(canvas);
+        let [one, other] = seam.vertices(canvas).map(|side| side.map(|vertex| canvas.uvs[vertex]));
         for axis in 0..2 {
             let apart = [0, 1].map(|end| (one[end][axis] - other[end][axis]).abs());
             repeats[axis] |= apart.into_iter().all(|apart| (apart - 1.0).abs() < 1.0e-4);
         }
     }
     repeats
+}
+
+fn seam_corners(canvas: &Canvas, seams: &[Seam]) -> Vec<[u32; 2]> {
+    let ends = seams.iter().flat_map(|seam| seam.vertices(canvas)).flatten();
+    let mut corners: Vec<[u32; 2]> =
+        ends.map(|vertex| [canvas.welds.position[vertex], canvas.welds.chart[vertex]]).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    corners
 }
 
 impl Seam {
@@ -314,10 +326,5 @@ impl Seam {
             other.swap(0, 1);
         }
         [one, other]
-    }
-
-    /// Their texture coordinates.
-    pub fn ends(&self, canvas: &Canvas) -> [[Vec2; 2]; 2] {
-        self.vertices(canvas).map(|side| side.map(|vertex| canvas.uvs[vertex]))
     }
 }

@@ -2,13 +2,14 @@
 
 use super::atlas::Atlas;
 use super::bins::Bins;
+use super::bytes::{MapBytes, blank};
 use super::canvas::Canvas;
 use super::cones::{Cones, Layer};
 use super::error::{BakeError, BakeWarning};
 use super::gutter;
 use super::maps::{BakedMap, Level};
 use super::mips::halved;
-use super::paint::{BESIDE, Band, Painter, blank};
+use super::paint::{BESIDE, Band, Painter};
 use super::report::BakeReport;
 use super::seams;
 use super::settings::{BakeSettings, BaseImage, MapKind, Maps};
@@ -112,12 +113,12 @@ async fn paint(painter: &Painter<'_>, pace: &Pace) -> (Level, usize) {
         pace.rest(0.0).await;
     }
     let rows = size * TILE as usize;
-    let band = |(row, coverage)| Band { row, coverage, maps: Default::default(), overlaps: 0 };
+    let band = |(row, coverage)| Band { row, coverage, maps: MapBytes::default(), overlaps: 0 };
     let mut bands: Vec<Band<'_>> = level.coverage.chunks_mut(rows).enumerate().map(band).collect();
     for (kind, map) in MapKind::ALL.into_iter().zip(&mut level.maps) {
         let Some(map) = map else { continue };
         for (band, bytes) in bands.iter_mut().zip(map.chunks_mut(rows * kind.format().bytes())) {
-            band.maps[kind as usize] = Some(bytes);
+            band.maps.put(kind, bytes);
         }
     }
     let count = bands.len();
@@ -147,7 +148,7 @@ async fn levels(
         let next = (level.size > 1).then(|| halved(&level));
         pace.rest(0.2).await;
         gutter::fill(&mut level, atlas.repeats, &pace.part(0.2..0.5)).await;
-        seams::close(&mut level, canvas, &atlas.seams, atlas.repeats, &pace.part(0.5..1.0)).await;
+        seams::close(&mut level, canvas, atlas, &pace.part(0.5..1.0)).await;
         for map in &mut maps {
             map.levels.extend(level.maps[map.kind as usize].take());
         }

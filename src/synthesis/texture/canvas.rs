@@ -25,6 +25,7 @@ pub struct Canvas {
     pub(super) uvs: Vec<Vec2>,
     pub(super) normals: Vec<Vec3>,
     pub(super) tangents: Vec<Vec4>,
+    pub(super) colors: Option<VertexColors>,
     pub(super) welds: Welds,
     /// For each vertex, the one of the mesh that was unwrapped, if any was.
     pub(super) sources: Option<Vec<u32>>,
@@ -41,6 +42,20 @@ pub struct CanvasAttributes {
     pub normals: Option<Vec<Vec3>>,
     /// Tangents in the plane of the normal; the fourth component, 1 or −1, times normal × tangent is the bitangent.
     pub tangents: Option<Vec<Vec4>>,
+    /// Colours by which the base is multiplied.
+    pub colors: Option<VertexColors>,
+}
+
+/// Colours per vertex, by which the base of a texture is multiplied: that of each texel by what lies between the
+/// corners of its triangle.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VertexColors {
+    /// The colours, linear sRGB. Limits: at least 0.
+    pub colors: Vec<Vec3>,
+    /// Whether the renderer multiplies the texture by them, too, as Bevy does for meshes with colours. Then they are
+    /// not in the map of colours, and those of vessels are divided by them, so that both are right on the screen, as
+    /// far as such a product can be as bright as the vessels. Otherwise the base in the map is already multiplied.
+    pub are_drawn: bool,
 }
 
 impl Canvas {
@@ -57,12 +72,13 @@ impl Canvas {
     /// # Errors
     /// Those of [`new`](Self::new).
     pub async fn new_paced(mesh: TriangleMesh, attributes: CanvasAttributes, pace: &Pace) -> Result<Self, BakeError> {
-        let CanvasAttributes { uvs, normals, tangents: given } = attributes;
+        let CanvasAttributes { uvs, normals, tangents: given, colors } = attributes;
         let vertices = mesh.positions().len();
         let counts = [
             ("texture coordinates", Some(uvs.len())),
             ("normals", normals.as_ref().map(Vec::len)),
             ("tangents", given.as_ref().map(Vec::len)),
+            ("colours", colors.as_ref().map(|colors| colors.colors.len())),
         ];
         for (what, count) in counts {
             if let Some(count) = count.filter(|&count| count != vertices) {
@@ -76,6 +92,10 @@ impl Canvas {
         let is_bad = |vertex: usize| given.as_ref().is_some_and(|tangents| !tangents[vertex].is_finite());
         if let Some(vertex) = (0..vertices).find(|&vertex| is_bad(vertex)) {
             return Err(BakeError::BadAttribute { what: "tangent", vertex });
+        }
+        let is_bad = |color: &Vec3| !(color.is_finite() && color.min_element() >= 0.0);
+        if let Some(vertex) = colors.as_ref().and_then(|colors| colors.colors.iter().position(is_bad)) {
+            return Err(BakeError::BadAttribute { what: "colour", vertex });
         }
         let flat_uvs = check_uvs(&mesh, &uvs, &pace.part(0.0..0.1)).await?;
         let normals = match normals {
@@ -92,10 +112,10 @@ impl Canvas {
             None => tangents(&mesh, (&uvs, &normals), &welds, &pace.part(0.6..1.0)).await,
         };
         pace.rest(1.0).await;
-        Ok(Self { mesh, uvs, normals, tangents, welds, sources: None, flat_uvs })
+        Ok(Self { mesh, uvs, normals, tangents, colors, welds, sources: None, flat_uvs })
     }
 
-    /// A canvas of a mesh with all drawing attributes.
+    /// A canvas of a mesh with all drawing attributes, whose colours are drawn.
     ///
     /// # Errors
     /// Those of [`new`](Self::new), and a mesh that is not usable.
@@ -110,8 +130,13 @@ impl Canvas {
     pub async fn of_shaded_paced(mesh: &ShadedMesh, pace: &Pace) -> Result<Self, BakeError> {
         let (positions, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
         let checked = TriangleMesh::new_paced(positions, triangles, None, &pace.part(0.0..0.1)).await?;
-        let attributes =
-            CanvasAttributes { uvs: mesh.uvs.clone(), normals: Some(mesh.normals.clone()), tangents: None };
+        let colors = mesh.colors.iter().map(|&[red, green, blue, _]| Vec3::new(red, green, blue)).collect();
+        let attributes = CanvasAttributes {
+            uvs: mesh.uvs.clone(),
+            normals: Some(mesh.normals.clone()),
+            tangents: None,
+            colors: Some(VertexColors { colors, are_drawn: true }),
+        };
         Self::new_paced(checked, attributes, &pace.part(0.1..1.0)).await
     }
 
@@ -142,6 +167,18 @@ impl Canvas {
     /// Tangents of every vertex, for a mesh that is drawn with the map of normals.
     pub fn tangents(&self) -> &[Vec4] {
         &self.tangents
+    }
+
+    /// Whether the base in the map of colours is multiplied by colours per vertex.
+    pub(super) fn tints_base(&self) -> bool {
+        self.colors.as_ref().is_some_and(|colors| !colors.are_drawn)
+    }
+
+    /// The colour between the corners of a triangle, or beside them, and whether the renderer draws it.
+    pub(super) fn color_at(&self, triangle: usize, weights: Vec3) -> Option<(Vec3, bool)> {
+        let VertexColors { colors, are_drawn } = self.colors.as_ref()?;
+        let [a, b, c] = self.mesh.triangles()[triangle].map(|vertex| colors[vertex as usize]);
+        Some(((a * weights.x + b * weights.y + c * weights.z).max(Vec3::ZERO), *are_drawn))
     }
 
     /// For each vertex, the one of the mesh that was unwrapped; `None` if the mesh had its own chart.

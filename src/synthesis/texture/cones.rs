@@ -36,30 +36,43 @@ pub(super) struct Cone {
     pub to_tip: [f32; 2],
     /// How far they are from the root.
     pub to_root: [f32; 2],
+    /// Whether it fades anywhere.
+    pub fades: bool,
     /// Whether the start and the end are round ends that don't fade.
     pub is_end: [bool; 2],
     pub layer: u32,
     pub node: u32,
-    /// Distance from the axis up to which it can be seen, besides the blur of the texels.
-    pub reach: f32,
     /// Depth, and height above the surface, at which it is no longer seen.
     pub max_depth: f32,
     /// Distance from the surface that doesn't count as depth.
     pub chord: f32,
-    /// Distance from a point of the surface up to which it can be seen, in the same way.
-    far: f32,
+    /// Distance from a point of the surface up to which it can be seen, besides the blur of the texels.
+    pub far: f32,
+    /// A box around all points that can see it.
+    bounds: Bounds,
 }
 
 impl Cone {
-    fn bounds(&self) -> Bounds {
-        let far = Vec3A::splat(self.far);
-        let Bounds { min, max } = Bounds::around(&[self.start, self.start + self.along]);
-        Bounds { min: min - far, max: max + far }
-    }
-
     /// Whether it can be seen from within a box, widened by the blur of the texels there.
     pub fn is_near(&self, region: &Bounds) -> bool {
-        self.bounds().overlaps(region)
+        // A long segment passes by many boxes that its own box meets.
+        let (along, from) = (Vec3A::from(self.along), 0.5 * (region.min + region.max) - Vec3A::from(self.start));
+        let share = (from.dot(along) / along.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let far = self.far + 0.5 * (region.max - region.min).length();
+        from.distance_squared(along * share) <= far * far
+    }
+
+    /// How much the ends leave of the vessel at a share of the axis, and how that changes along it.
+    #[inline(always)]
+    pub fn fade(&self, share: f32) -> (f32, f32) {
+        let smooth = |[start, end]: [f32; 2]| {
+            let at = start + (end - start) * share;
+            let is_whole = at >= 1.0;
+            let at = if is_whole { 1.0 } else { at };
+            (at * at * (3.0 - 2.0 * at), 6.0 * at * (1.0 - at) * (end - start))
+        };
+        let ((tip, tip_along), (root, root_along)) = (smooth(self.to_tip), smooth(self.to_root));
+        (tip * root, tip_along * root + tip * root_along)
     }
 }
 
@@ -106,7 +119,7 @@ impl Cones {
             let deepest = cones[before..].iter().map(|cone: &Cone| cone.max_depth).fold(0.0, f32::max);
             looks.push(Look { look: layer.look.clone(), deepest });
         }
-        let boxes = BoxTree::new_paced(cones.len(), |cone| cones[cone].bounds(), &pace.part(0.6..1.0)).await;
+        let boxes = BoxTree::new_paced(cones.len(), |cone| cones[cone].bounds, &pace.part(0.6..1.0)).await;
         let bumps = |sign: f32| {
             let bump = |cone: &Cone| {
                 let radius = cone.start_radius.max(cone.start_radius + cone.widening);
@@ -157,21 +170,26 @@ async fn add(cones: &mut Vec<Cone>, number: u32, Layer { tree, look }: &Layer<'_
         let chord = VesselLook::CHORD_DEPTH * along.length();
         let blur = look.with_mound(look.blur_at(widest, max_depth + look.depth * widest), widest);
         let reach = widest + SEEN * blur;
+        let depth = max_depth + chord;
+        let far = (reach * reach + depth * depth).sqrt();
+        let start = tree.positions()[parent];
+        let Bounds { min, max } = Bounds::around(&[start, start + along]);
         cones.push(Cone {
-            start: tree.positions()[parent],
+            start,
             along,
             start_radius,
             widening: radius - start_radius,
             shade: [start_radius, radius].map(shade),
             to_tip: to_tip[node],
             to_root: [to_root[parent], to_root[node]],
+            fades: to_tip[node].into_iter().chain([to_root[parent], to_root[node]]).any(|share| share < 1.0),
             is_end: [look.fade == 0.0 && tree.parents()[parent] == NO_PARENT, look.fade == 0.0 && counts[node] == 0],
             layer: number,
             node: node as u32,
-            reach,
             max_depth,
             chord,
-            far: (reach * reach + (max_depth + chord) * (max_depth + chord)).sqrt(),
+            far,
+            bounds: Bounds { min: min - far, max: max + far },
         });
     };
     pace.each(tree.len(), segment).await;

@@ -63,8 +63,8 @@ pub enum BakeError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// A normal or tangent that is not finite.
-    #[error("vertex {vertex} has a {what} that is not finite; repair the mesh, or leave out all of them")]
+    /// A normal or tangent that is not finite, or a colour that is not finite or below 0.
+    #[error("vertex {vertex} has a {what} that is not finite, or below 0; repair the mesh, or leave out all of them")]
     BadAttribute {
         /// What it is.
         what: &'static str,

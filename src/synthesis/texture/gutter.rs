@@ -1,11 +1,12 @@
 //! Fills the gutters between charts: every texel that belongs to none takes the values of the nearest one that does.
 //!
-//! Jump flooding (Rong & Tan 2006) finds the nearest texel nearly always, in log n passes. This finds it always, in two:
-//! along columns, then along rows as the lower envelope of parabolas (Felzenszwalb & Huttenlocher, "Distance
+//! Jump flooding (Rong & Tan 2006) finds the nearest texel nearly always, in log n passes. This finds it always, in
+//! two: along columns, then along rows as the lower envelope of parabolas (Felzenszwalb & Huttenlocher, "Distance
 //! transforms of sampled functions", 2012).
 
 use super::maps::Level;
 use crate::synthesis::{pace::Pace, parallel};
+use std::ops::Range;
 
 /// A column without any known texel.
 const NONE: i16 = i16::MAX;
@@ -46,44 +47,56 @@ async fn nearest_in_columns(coverage: &[u8], size: usize, repeats: bool, pace: &
     // Twice around if the texture goes on.
     let rounds = if repeats { 2 * size } else { size };
     let mut last = vec![NONE; size];
-    let mut down = |step: usize| {
-        let row = step % size;
-        for (column, last) in last.iter_mut().enumerate() {
-            let texel = row * size + column;
-            *last = if coverage[texel] != 0 { 0 } else { last.saturating_add(1) };
-            // The nearest above lies upwards.
-            if *last != NONE && (ways[texel] == NONE || *last < -ways[texel]) {
-                ways[texel] = -*last;
-            }
+    // Without branches, so that a loop works on many columns at a time.
+    let walk = |row: usize, last: &mut [i16], ways: &mut [i16], sign: i16| {
+        let line = row * size..(row + 1) * size;
+        for ((last, way), known) in last.iter_mut().zip(&mut ways[line.clone()]).zip(&coverage[line]) {
+            let on = if *last < NONE { *last + 1 } else { NONE };
+            *last = if *known != 0 { 0 } else { on };
+            let other = way.abs();
+            *way = if *last < other { sign * *last } else { *way };
         }
     };
-    pace.part(0.0..0.5).stretches(rounds, 8, |steps| steps.for_each(&mut down)).await;
+    let down = |steps: Range<usize>| steps.for_each(|step| walk(step % size, &mut last, &mut ways, -1));
+    pace.part(0.0..0.5).stretches(rounds, ROWS, down).await;
     last.fill(NONE);
-    let mut up = |step: usize| {
-        let row = (rounds - 1 - step) % size;
-        for (column, last) in last.iter_mut().enumerate() {
-            let texel = row * size + column;
-            *last = if coverage[texel] != 0 { 0 } else { last.saturating_add(1) };
-            if *last != NONE && (ways[texel] == NONE || *last < ways[texel].abs()) {
-                ways[texel] = *last;
-            }
-        }
-    };
-    pace.part(0.5..1.0).stretches(rounds, 8, |steps| steps.for_each(&mut up)).await;
+    let up = |steps: Range<usize>| steps.for_each(|step| walk((rounds - 1 - step) % size, &mut last, &mut ways, 1));
+    pace.part(0.5..1.0).stretches(rounds, ROWS, up).await;
     ways
 }
 
 /// For each unknown texel of a row, itself and the nearest known one.
 fn nearest_in_row(known: &[u8], columns: &[i16], row: usize, repeats: [bool; 2]) -> Vec<(u32, u32)> {
-    let size = known.len();
-    if known.iter().all(|texel| *texel != 0) {
-        return Vec::new();
+    let (mut sources, mut from) = (Vec::new(), 0);
+    while let Some(start) = known[from..].iter().position(|texel| *texel == 0).map(|more| from + more) {
+        let length = known[start..].iter().position(|texel| *texel != 0).unwrap_or(known.len() - start);
+        // A known texel at the end of a gap is no farther away than the gap is long.
+        let reach = if length < known.len() { length as i64 } else { 0 };
+        from = start + length;
+        nearest_in_gap(start..from, reach, columns, row, (known.len(), repeats[0]), &mut sources);
     }
-    let half = if repeats[0] { (size / 2) as i64 } else { 0 };
+    sources
+}
+
+/// The same for one gap, from columns within a reach of it; 0 for all of them.
+fn nearest_in_gap(
+    gap: Range<usize>,
+    reach: i64,
+    columns: &[i16],
+    row: usize,
+    (size, repeats): (usize, bool),
+    sources: &mut Vec<(u32, u32)>,
+) {
     let way = |column: i64| columns[row * size + column.rem_euclid(size as i64) as usize];
+    let half = if repeats { (size / 2) as i64 } else { 0 };
+    let (first, end) = (-half, size as i64 + half);
+    let near = match reach {
+        0 => first..end,
+        reach => first.max(gap.start as i64 - reach)..end.min(gap.end as i64 + reach),
+    };
     // The parabolas that are lowest somewhere, and where each begins to be.
     let mut lowest: Vec<(i64, i64, f64)> = Vec::new();
-    for column in -half..size as i64 + half {
+    for column in near {
         let down = i64::from(way(column));
         if down == i64::from(NONE) {
             continue;
@@ -100,23 +113,17 @@ fn nearest_in_row(known: &[u8], columns: &[i16], row: usize, repeats: [bool; 2])
         }
         lowest.push((column, value, from));
     }
-    let (mut at, mut sources) = (0, Vec::new());
-    if lowest.is_empty() {
-        // A chart may be too small for any texel.
-        return sources;
-    }
-    for (column, known) in known.iter().enumerate() {
-        while at + 1 < lowest.len() && lowest[at + 1].2 <= column as f64 {
+    let mut at = 0;
+    for column in gap {
+        while lowest.get(at + 1).is_some_and(|next| next.2 <= column as f64) {
             at += 1;
         }
-        if *known == 0 {
-            let from = lowest[at].0;
-            let source_row = (row as i64 + i64::from(way(from))).rem_euclid(size as i64);
-            let source = source_row * size as i64 + from.rem_euclid(size as i64);
-            sources.push(((row * size + column) as u32, source as u32));
-        }
+        // A chart may be too small for any texel.
+        let Some(&(from, ..)) = lowest.get(at) else { return };
+        let source_row = (row as i64 + i64::from(way(from))).rem_euclid(size as i64);
+        let source = source_row * size as i64 + from.rem_euclid(size as i64);
+        sources.push(((row * size + column) as u32, source as u32));
     }
-    sources
 }
 
 #[cfg(test)]

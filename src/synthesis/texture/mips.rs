@@ -1,7 +1,8 @@
 //! Smaller levels of maps: means over the texels within charts.
 
+use super::bytes::{normal_bytes, normal_of};
 use super::maps::Level;
-use super::paint::{BESIDE, normal_bytes};
+use super::paint::{BESIDE, COVERED};
 use super::settings::MapKind;
 use super::srgb::Srgb;
 use crate::synthesis::parallel;
@@ -50,16 +51,18 @@ impl Row<'_> {
             let first = 2 * number * level.size + 2 * column;
             let four = [first, first + 1, first + level.size, first + level.size + 1];
             let covers = four.map(|texel| level.coverage[texel]);
+            if covers == [COVERED; 4] {
+                self.coverage[column] = COVERED;
+                self.mix(level, column, &(four, [0.25; 4]));
+                continue;
+            }
             let weights = covers.map(|cover| if cover > BESIDE { f32::from(cover) } else { 0.0 });
             let sum: f32 = weights.iter().sum();
-            self.coverage[column] = if sum > 0.0 {
-                ((0.25 * sum + 0.5) as u8).max(BESIDE + 1)
-            } else {
-                covers.into_iter().max().unwrap_or(0)
-            };
             if sum > 0.0 {
+                self.coverage[column] = ((0.25 * sum + 0.5) as u8).max(BESIDE + 1);
                 self.mix(level, column, &(four, weights.map(|weight| weight / sum)));
             } else if let Some(known) = (0..4).find(|&texel| covers[texel] != 0) {
+                self.coverage[column] = BESIDE;
                 let weights = std::array::from_fn(|texel| if texel == known { 1.0 } else { 0.0 });
                 self.mix(level, column, &(four, weights));
             }
@@ -92,15 +95,18 @@ impl Row<'_> {
 }
 
 fn mean((texels, weights): &Four, value: impl Fn(usize) -> f32) -> f32 {
-    (0..4).filter(|&k| weights[k] > 0.0).map(|k| weights[k] * value(texels[k])).sum()
+    (0..4).fold(0.0, |sum, k| sum + weights[k] * value(texels[k]))
 }
 
 /// The bytes of a texel, if all four that count have the same.
 fn same(from: &[u8], (texels, weights): &Four) -> Option<[u8; 4]> {
-    let bytes = |texel: usize| -> [u8; 4] { std::array::from_fn(|k| from[4 * texel + k]) };
-    let mut counted = (0..4).filter(|&k| weights[k] > 0.0).map(|k| bytes(texels[k]));
-    let first = counted.next()?;
-    counted.all(|other| other == first).then_some(first)
+    let [a, b, c, d] = texels.map(|texel| -> [u8; 4] { std::array::from_fn(|k| from[4 * texel + k]) });
+    if a == b && a == c && a == d {
+        return Some(a);
+    }
+    let mut counted = [a, b, c, d].into_iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
+    let (first, _) = counted.next()?;
+    counted.all(|(other, _)| other == first).then_some(first)
 }
 
 fn mean_color(from: &[u8], four: &Four) -> [u8; 4] {
@@ -120,14 +126,6 @@ fn mean_normal(from: &[u8], four: &Four) -> ([u8; 4], f32) {
     let (texels, weights) = four;
     let sum: Vec3 = (0..4).map(|k| normal_of(&from[4 * texels[k]..][..3]) * weights[k]).sum();
     (normal_bytes(sum.try_normalize().unwrap_or(Vec3::Z)), sum.length().min(1.0))
-}
-
-/// The unit normal that bytes stand for.
-pub(super) fn normal_of(bytes: &[u8]) -> Vec3 {
-    let component = |byte: u8| (f32::from(byte) - 127.5) / 127.5;
-    // 128 stands for 0.
-    let centred = |byte: u8| if byte == 128 { 0.0 } else { component(byte) };
-    Vec3::new(centred(bytes[0]), centred(bytes[1]), component(bytes[2])).normalize_or(Vec3::Z)
 }
 
 /// The mean roughness of texels whose normals have a mean of some length.

@@ -6,9 +6,10 @@
 //!
 //! Every texel is evaluated at its own point of the surface, in space: the vessels near it are projected along the
 //! normal, as far as tissue lets them through. So charts decide only where samples lie, and vessels run on across their
-//! borders, also where charts are mirrored. A vessel's edge is softened in closed form, by its depth and by half a texel,
-//! which keeps it from flickering; no image is ever blurred. Beyond the borders of charts, texels are evaluated for what
-//! interpolation sees, and filled from the nearest chart for what smaller levels see.
+//! borders, also where charts are mirrored. A vessel's edge is softened in closed form, by its depth and by half a
+//! texel, which keeps it from flickering; images are blurred only along seams, as far as both sides differ. Beyond the
+//! borders of charts, texels are evaluated for what interpolation sees, and filled from the nearest chart for what
+//! smaller levels see.
 //!
 //! Source: Rauch & Harders (2021), section 4, who project vessels onto each triangle of the organ, blur the images, the
 //! deeper the more, and combine them.
@@ -39,16 +40,20 @@
 mod atlas;
 mod bake;
 mod bins;
+mod bytes;
 mod canvas;
 mod cones;
 mod error;
 mod face;
 mod gauss;
+mod groups;
 mod gutter;
 mod limits;
 mod look;
 mod maps;
+mod meeting;
 mod mips;
+mod owners;
 mod paint;
 mod profile;
 mod report;
@@ -61,10 +66,9 @@ mod texels;
 #[cfg(feature = "unwrap")]
 mod unwrap;
 mod welds;
-mod window;
 
 pub use bake::Bake;
-pub use canvas::{Canvas, CanvasAttributes};
+pub use canvas::{Canvas, CanvasAttributes, VertexColors};
 pub use cones::Layer;
 pub use error::{BakeError, BakeWarning};
 pub use look::VesselLook;

@@ -2,29 +2,30 @@
 
 use super::atlas::Atlas;
 use super::bins::Bins;
+use super::bytes::MapBytes;
 use super::canvas::Canvas;
 use super::cones::Cones;
 use super::face::Face;
-use super::gauss::SEEN;
+use super::groups::Groups;
+use super::meeting::{LANES, Spots};
+use super::owners::{NOBODY, Owners, place, within};
 use super::settings::{BakeSettings, BaseImage, MapKind};
-use super::shade::{Near, Sight};
-use super::srgb::Srgb;
-use super::texels::{MARGIN, TILE, TILE_TEXELS};
-use super::window::Windows;
+use super::shade::Sight;
+use super::texels::{MARGIN, TILE};
 use crate::synthesis::space::bvh::Bounds;
-use bevy_math::{DVec2, Vec2, Vec3};
+use bevy_math::{DVec2, Vec3, Vec4};
 use std::ops::Range;
 
 /// Coverage of a texel beyond the border of a chart: its values are known, and it counts for nothing.
 pub(super) const BESIDE: u8 = 1;
 /// Coverage of a texel within a chart.
 pub(super) const COVERED: u8 = 255;
-/// Owner of a texel that no triangle has.
-const NOBODY: u32 = u32::MAX;
-/// Least weight of a corner at a point well within a triangle.
-const WITHIN: f32 = 0.01;
-/// 16 bits for a depth where there is no vessel.
-const NO_DEPTH: u16 = u16::MAX;
+/// Texels along the side of a block, in which vessels are looked for together.
+const BLOCK: i64 = 8;
+/// Columns of a group of texels.
+const ACROSS: usize = LANES / 2;
+/// Blocks along the side of a tile.
+const BLOCKS: usize = TILE as usize / BLOCK as usize;
 
 /// A row of tiles of all maps.
 pub(super) struct Band<'a> {
@@ -32,8 +33,8 @@ pub(super) struct Band<'a> {
     pub row: usize,
     /// Coverage of each texel; 0 where nothing is known.
     pub coverage: &'a mut [u8],
-    /// Bytes of each kind of map that is made.
-    pub maps: [Option<&'a mut [u8]>; MapKind::ALL.len()],
+    /// The maps that are made.
+    pub maps: MapBytes<'a>,
     /// Texels that several parts of the surface claim.
     pub overlaps: usize,
 }
@@ -51,47 +52,64 @@ pub(super) struct Painter<'a> {
 /// Memory for one tile after the other.
 #[derive(Default)]
 struct Scratch {
-    /// For each texel, the place of its triangle among those of the tile.
-    owners: Vec<u32>,
-    /// For each texel without an owner, the squared distance from the nearest triangle.
-    distances: Vec<f64>,
     faces: Vec<Face>,
+    owners: Owners,
+    /// The surface within each block, widened by what the blur of its texels reaches.
+    blocks: Vec<Bounds>,
+    /// Cones near a block.
     found: Vec<u32>,
-    near: Vec<Near>,
-    in_row: Vec<Near>,
-    sight: Sight,
+    /// The texels of a block, and what is seen from them.
+    groups: [Group; LANES],
+    sights: [Sight; LANES],
 }
 
-/// The colour, height, normal … of a texel before any vessel.
-pub(super) fn blank(kind: MapKind, settings: &BakeSettings, range: [f32; 2]) -> Vec<u8> {
-    let srgb = Srgb::tables();
-    match kind {
-        MapKind::Albedo => {
-            let [red, green, blue] = settings.base_color.map(|channel| srgb.encode(channel));
-            vec![red, green, blue, 255]
-        }
-        MapKind::Normal => vec![128, 128, 255, 255],
-        MapKind::Height => height(0.0, range).to_le_bytes().to_vec(),
-        MapKind::Roughness => vec![255, unit_byte(settings.base_roughness), 0, 255],
-        MapKind::Id => vec![0; 4],
-        MapKind::Depth => NO_DEPTH.to_le_bytes().to_vec(),
+/// Texels that are painted together: [`ACROSS`] columns of two rows.
+struct Group {
+    spots: Spots,
+    /// For each texel, its triangle in the tile, its centre, and the weights of the triangle's corners.
+    owners: [u32; LANES],
+    at: [DVec2; LANES],
+    weights: [Vec3; LANES],
+    /// Largest blur of a texel.
+    blur: f32,
+}
+
+impl Default for Group {
+    fn default() -> Self {
+        let (at, weights) = ([DVec2::ZERO; LANES], [Vec3::ZERO; LANES]);
+        Self { spots: Spots::NOWHERE, owners: [NOBODY; LANES], at, weights, blur: 0.0 }
     }
 }
 
-fn unit_byte(value: f32) -> u8 {
-    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+impl Group {
+    /// Sets the texels of a block's group.
+    fn set(&mut self, block: &Tile, number: usize, tile: &Tile, (owners, faces, origin): (&Owners, &[Face], Vec3)) {
+        *self = Self::default();
+        for k in 0..LANES {
+            let (right, down) = ((number % 2) * ACROSS + k % ACROSS, (number / 2) * 2 + k / ACROSS);
+            let (column, row) = (block[0].start + right as i64, block[1].start + down as i64);
+            if column < block[0].end && row < block[1].end {
+                self.owners[k] = owners.of(place(tile, column, row));
+                self.at[k] = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
+            }
+        }
+        // Most groups lie within one triangle.
+        let mut is_set = self.owners.map(|owner| owner == NOBODY);
+        while let Some(first) = is_set.iter().position(|is_set| !is_set) {
+            let owner = self.owners[first];
+            let (face, owns) = (&faces[owner as usize], self.owners.map(|other| other == owner));
+            let weights = self.at.map(|at| face.placed.weights(at));
+            face.set_spots(&weights, &owns, origin, &mut self.spots);
+            self.blur = self.blur.max(face.blur);
+            for k in (0..LANES).filter(|&k| owns[k]) {
+                (self.weights[k], is_set[k]) = (weights[k], true);
+            }
+        }
+    }
 }
 
-/// A height as 16 bits.
-fn height(value: f32, [low, high]: [f32; 2]) -> u16 {
-    if high > low { ((value - low) / (high - low) * 65535.0 + 0.5) as u16 } else { 0 }
-}
-
-/// A normal as bytes.
-pub(super) fn normal_bytes(normal: Vec3) -> [u8; 4] {
-    let [x, y, z] = (normal * 127.5 + 128.0).to_array().map(|value| value as u8);
-    [x, y, z, 255]
-}
+/// A tile: its columns and rows.
+type Tile = [Range<i64>; 2];
 
 impl Painter<'_> {
     /// Paints a row of tiles.
@@ -110,156 +128,135 @@ impl Painter<'_> {
         let size = self.settings.size;
         let range = |tile: usize| i64::from(tile as u32 * TILE)..i64::from(((tile as u32 + 1) * TILE).min(size));
         let tile = [range(column), range(band.row)];
+        let placements = || entries.iter().map(|&entry| &self.atlas.placements[entry as usize]);
         scratch.faces.clear();
-        scratch.faces.extend(
-            entries
-                .iter()
-                .map(|&entry| Face::of(self.canvas, self.atlas, &self.atlas.placements[entry as usize], size)),
-        );
-        scratch.owners.clear();
-        scratch.owners.resize(TILE_TEXELS, NOBODY);
-        band.overlaps += own(&tile, scratch);
-        self.own_margin(entries, &tile, scratch);
+        scratch.faces.extend(placements().map(|placement| Face::of(self.canvas, self.atlas, placement, size)));
+        band.overlaps += scratch.owners.own(&tile, &scratch.faces);
+        scratch.owners.own_margin(&tile, &scratch.faces, placements().map(|placement| placement.is_border));
         self.cover(&tile, band, scratch);
-        self.paint(&tile, band, scratch);
-    }
-
-    /// Gives texels beside the borders of charts to the nearest triangle.
-    fn own_margin(&self, entries: &[u32], tile: &[Range<i64>; 2], scratch: &mut Scratch) {
-        scratch.distances.clear();
-        for (number, &entry) in entries.iter().enumerate() {
-            if !self.atlas.placements[entry as usize].is_border {
-                continue;
-            }
-            if scratch.distances.is_empty() {
-                let outside = |owner: &u32| if *owner == NOBODY { MARGIN * MARGIN } else { -1.0 };
-                scratch.distances.extend(scratch.owners.iter().map(outside));
-            }
-            let placed = scratch.faces[number].placed;
-            for (texel, at) in texels(tile, &placed.region(MARGIN)) {
-                let best = &mut scratch.distances[texel];
-                if *best >= 0.0 {
-                    let squared = placed.distance_squared(at);
-                    if squared < *best {
-                        (*best, scratch.owners[texel]) = (squared, number as u32);
-                    }
-                }
-            }
+        self.find(&tile, scratch);
+        for number in 0..BLOCKS * BLOCKS {
+            self.block(number, &tile, band, scratch);
         }
     }
 
-    /// Notes which texels are covered, and lays the base image under them.
-    fn cover(&self, [columns, rows]: &[Range<i64>; 2], band: &mut Band<'_>, scratch: &Scratch) {
+    /// Notes which texels are covered, and lays the base under them where it isn't the same everywhere.
+    fn cover(&self, tile @ [columns, rows]: &Tile, band: &mut Band<'_>, scratch: &Scratch) {
         let size = self.settings.size as usize;
+        let varies = self.base.is_some() || self.canvas.tints_base();
         for (line, row) in rows.clone().enumerate() {
-            let first = line * size + columns.start as usize;
-            for column in 0..(columns.end - columns.start) as usize {
-                let texel = line * TILE as usize + column;
-                if scratch.owners[texel] == NOBODY {
+            let first = line * size;
+            for column in columns.clone() {
+                let (texel, number) = (first + column as usize, place(tile, column, row));
+                let owner = scratch.owners.of(number);
+                if owner == NOBODY {
                     continue;
                 }
-                let is_beside = scratch.distances.get(texel).is_some_and(|distance| *distance >= 0.0);
-                band.coverage[first + column] = if is_beside { BESIDE } else { COVERED };
-                if let (Some(image), Some(albedo)) = (self.base, &mut band.maps[MapKind::Albedo as usize]) {
-                    let at = Vec2::new((columns.start as usize + column) as f32 + 0.5, row as f32 + 0.5) / size as f32;
-                    let bytes = image.at(at).map(|channel| Srgb::tables().encode(channel));
-                    albedo[4 * (first + column)..][..3].copy_from_slice(&bytes);
+                band.coverage[texel] = if scratch.owners.is_beside(number) { BESIDE } else { COVERED };
+                if varies && band.maps.has(MapKind::Albedo) {
+                    let at = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
+                    let face = &scratch.faces[owner as usize];
+                    let (base, _) = self.base(at, face.triangle, face.placed.weights(at));
+                    band.maps.set_albedo(texel, base);
                 }
             }
         }
     }
 
-    /// Paints the vessels that are near.
-    fn paint(&self, tile: &[Range<i64>; 2], band: &mut Band<'_>, scratch: &mut Scratch) {
-        let region = scratch.faces.iter().map(|face| face.region(tile)).fold(Bounds::EMPTY, Bounds::with);
-        self.cones.near(&region, &mut scratch.found);
-        if scratch.found.is_empty() {
+    /// Finds the surface of each block.
+    fn find(&self, tile: &Tile, scratch: &mut Scratch) {
+        let Scratch { faces, blocks, .. } = scratch;
+        blocks.clear();
+        blocks.resize(BLOCKS * BLOCKS, Bounds::EMPTY);
+        for face in faces {
+            let region = within(tile, &face.placed.region(MARGIN));
+            let [columns, rows] = [0, 1].map(|axis| {
+                let start = tile[axis].start;
+                (region[axis].start - start) / BLOCK..(region[axis].end - start + BLOCK - 1) / BLOCK
+            });
+            for row in rows {
+                for column in columns.clone() {
+                    let part = within(&block_of(tile, [column, row]), &region);
+                    let block = &mut blocks[row as usize * BLOCKS + column as usize];
+                    *block = block.with(face.region(&part));
+                }
+            }
+        }
+    }
+
+    /// Paints the vessels that are near a block.
+    fn block(&self, number: usize, tile: &Tile, band: &mut Band<'_>, scratch: &mut Scratch) {
+        let Scratch { faces, owners, blocks, found, groups, sights, .. } = scratch;
+        self.cones.near(&blocks[number], found);
+        if found.is_empty() {
             return;
         }
-        let Scratch { owners, faces, found, near, in_row, sight, .. } = scratch;
-        for (number, face) in faces.iter().enumerate() {
-            let (region, blur) = (face.region(tile), face.blur());
-            let is_near = |cone: &&u32| self.cones.cones[**cone as usize].is_near(&region);
-            near.clear();
-            let mut windows = None;
-            for &cone in found.iter().filter(is_near) {
-                let windows = windows.get_or_insert_with(|| Windows::of(face));
-                let (shape, start) = (&self.cones.cones[cone as usize], face.corners[0]);
-                let look = &self.cones.looks[shape.layer as usize].look;
-                if let Some((window, reach)) = windows.of_cone(shape, look, tile) {
-                    near.push(Near::new(cone, shape.start - start, reach + SEEN * blur, window));
+        let origin = faces[0].corners[0];
+        let block = block_of(tile, [number % BLOCKS, number / BLOCKS].map(|part| part as i64));
+        let mut outline = Groups::EMPTY;
+        for (number, group) in groups.iter_mut().enumerate() {
+            group.set(&block, number, tile, (owners, faces, origin));
+            outline.set(number, &group.spots, &group.owners.map(|owner| owner != NOBODY), group.blur);
+        }
+        sights.iter_mut().for_each(Sight::clear);
+        for &number in found.iter() {
+            let cone = &self.cones.cones[number as usize];
+            let (start, look) = (cone.start - origin, &self.cones.looks[cone.layer as usize].look);
+            for (group, reach) in outline.reaches(cone, start, look).into_iter().enumerate() {
+                if reach > 0.0 {
+                    sights[group].add((cone, number), look, (start, reach), &groups[group].spots, band.maps.made);
                 }
             }
-            if near.is_empty() {
-                continue;
-            }
-            let [columns, rows] = within(tile, &face.placed.region(MARGIN));
-            for row in rows {
-                in_row.clear();
-                in_row.extend(near.iter().filter(|segment| segment.is_in_row(row as i32)).cloned());
-                if in_row.is_empty() {
-                    continue;
-                }
-                for column in columns.clone() {
-                    if owners[place(tile, column, row)] == number as u32 {
-                        let at = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
-                        let weights = face.placed.weights(at);
-                        sight.look(self.cones, in_row, column as i32, || face.spot(weights));
-                        self.write((at, weights), face, band, sight);
-                    }
-                }
+        }
+        for (group, sight) in groups.iter().zip(sights.iter()) {
+            for k in (0..LANES).filter(|&k| group.owners[k] != NOBODY) {
+                let triangle = faces[group.owners[k] as usize].triangle;
+                self.write((group.at[k], group.weights[k]), triangle, band, (sight, k));
             }
         }
     }
 
-    fn write(&self, (at, weights): (DVec2, Vec3), face: &Face, band: &mut Band<'_>, sight: &mut Sight) {
-        let size = self.settings.size as usize;
-        let texel = (at.y as usize - band.row * TILE as usize) * size + at.x as usize;
-        let [albedo, normal, heights, roughness, ids, depths] = &mut band.maps;
-        if !sight.seen.is_empty() && (albedo.is_some() || roughness.is_some()) {
-            let base = match (self.base, &albedo) {
-                (Some(image), Some(_)) => image.at(at.as_vec2() / size as f32),
-                _ => self.settings.base_color,
-            };
-            let (color, rough) = sight.over(base, self.settings.base_roughness);
-            if let Some(albedo) = albedo {
-                albedo[4 * texel..][..3].copy_from_slice(&color.map(|channel| Srgb::tables().encode(channel)));
-            }
-            if let Some(roughness) = roughness {
-                roughness[4 * texel + 1] = unit_byte(rough);
-            }
+    /// Writes what is seen at a texel.
+    fn write(&self, (at, weights): (DVec2, Vec3), triangle: usize, band: &mut Band<'_>, (sight, k): (&Sight, usize)) {
+        let texel = (at.y as usize - band.row * TILE as usize) * self.settings.size as usize + at.x as usize;
+        let maps = &mut band.maps;
+        if sight.is_seen(k) {
+            let (base, filter) = self.base(at, triangle, weights);
+            let (color, roughness) = sight.over(k, self.cones, (base, self.settings.base_roughness), filter);
+            maps.set_albedo(texel, color);
+            maps.set_roughness(texel, roughness);
         }
-        if sight.height != 0.0 {
-            if let Some(normal) = normal {
-                let seen = self.tangent_normal(face.triangle, weights, sight.slope);
-                normal[4 * texel..][..4].copy_from_slice(&normal_bytes(seen));
+        if let Some((height, slope)) = sight.relief(k) {
+            if maps.has(MapKind::Normal) {
+                maps.set_normal(texel, self.tangent_normal(triangle, weights, slope));
             }
-            if let Some(heights) = heights {
-                let value = height(sight.height, self.cones.highest);
-                heights[2 * texel..][..2].copy_from_slice(&value.to_le_bytes());
-            }
+            maps.set_height(texel, height, self.cones.highest);
         }
-        if let Some((cone, depth)) = sight.covering {
+        if let Some((cone, depth)) = sight.covering(k) {
             let cone = &self.cones.cones[cone as usize];
-            if let Some(ids) = ids {
-                let id = cone.node | (cone.layer + 1) << 24;
-                ids[4 * texel..][..4].copy_from_slice(&id.to_le_bytes());
-            }
-            if let Some(depths) = depths {
-                // One less than the value that stands for no vessel.
-                let value = (depth / self.cones.deepest).clamp(0.0, 1.0) * f32::from(NO_DEPTH - 1) + 0.5;
-                depths[2 * texel..][..2].copy_from_slice(&(value as u16).to_le_bytes());
-            }
+            maps.set_id(texel, cone.node | (cone.layer + 1) << 24);
+            maps.set_depth(texel, depth / self.cones.deepest);
+        }
+    }
+
+    /// The base at a texel, and what vessels' colours are divided by there.
+    fn base(&self, at: DVec2, triangle: usize, weights: Vec3) -> (Vec3, Vec3) {
+        let base = match self.base {
+            Some(image) => image.at(at.as_vec2() / self.settings.size as f32),
+            None => Vec3::from_array(self.settings.base_color),
+        };
+        match self.canvas.color_at(triangle, weights) {
+            Some((color, true)) => (base, color),
+            Some((color, false)) => (base * color, Vec3::ONE),
+            None => (base, Vec3::ONE),
         }
     }
 
     /// The normal of a surface with a slope, in the tangents that a renderer interpolates.
     fn tangent_normal(&self, triangle: usize, weights: Vec3, slope: Vec3) -> Vec3 {
         let vertices = self.canvas.mesh.triangles()[triangle].map(|vertex| vertex as usize);
-        let weights = weights.to_array();
-        let mut normal = Vec3::ZERO;
-        let mut tangent = bevy_math::Vec4::ZERO;
-        for (vertex, weight) in vertices.into_iter().zip(weights) {
+        let (mut normal, mut tangent) = (Vec3::ZERO, Vec4::ZERO);
+        for (vertex, weight) in vertices.into_iter().zip(weights.to_array()) {
             normal += self.canvas.normals[vertex] * weight;
             tangent += self.canvas.tangents[vertex] * weight;
         }
@@ -275,66 +272,10 @@ impl Painter<'_> {
     }
 }
 
-/// Gives the texels within triangles to the first of them. Returns how many another one claims as well.
-fn own(tile: &[Range<i64>; 2], scratch: &mut Scratch) -> usize {
-    let Scratch { owners, faces, .. } = scratch;
-    let mut overlaps = 0;
-    for (number, face) in faces.iter().enumerate() {
-        let [_, rows] = face.placed.region(0.0);
-        for row in rows.start.max(tile[1].start)..rows.end.min(tile[1].end) {
-            let span = face.placed.span(row);
-            let line = (row - tile[1].start) as usize * TILE as usize;
-            for column in span.start.max(tile[0].start)..span.end.min(tile[0].end) {
-                let owner = &mut owners[line + (column - tile[0].start) as usize];
-                if *owner == NOBODY {
-                    *owner = number as u32;
-                } else {
-                    let at = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
-                    overlaps += usize::from(face.placed.weights(at).min_element() > WITHIN);
-                }
-            }
-        }
-    }
-    overlaps
-}
-
-/// The texels of a tile within a region, with their centres in the texture.
-fn texels(tile: &[Range<i64>; 2], region: &[Range<i64>; 2]) -> impl Iterator<Item = (usize, DVec2)> + use<> {
-    let ([columns, rows], tile) = (within(tile, region), tile.clone());
-    rows.flat_map(move |row| {
-        let tile = tile.clone();
-        columns
-            .clone()
-            .map(move |column| (place(&tile, column, row), DVec2::new(column as f64 + 0.5, row as f64 + 0.5)))
+/// The texels of a block of a tile.
+fn block_of(tile: &Tile, block: [i64; 2]) -> Tile {
+    [0, 1].map(|axis| {
+        let start = tile[axis].start + block[axis] * BLOCK;
+        start..(start + BLOCK).min(tile[axis].end)
     })
-}
-
-/// The columns and rows of a tile within a region.
-fn within(tile: &[Range<i64>; 2], region: &[Range<i64>; 2]) -> [Range<i64>; 2] {
-    [0, 1].map(|axis| region[axis].start.max(tile[axis].start)..region[axis].end.min(tile[axis].end))
-}
-
-/// The place of a texel in its tile.
-fn place(tile: &[Range<i64>; 2], column: i64, row: i64) -> usize {
-    (row - tile[1].start) as usize * TILE as usize + (column - tile[0].start) as usize
-}
-
-impl BaseImage {
-    /// Linear colour at a point of the texture, between the four nearest texels.
-    fn at(&self, uv: Vec2) -> [f32; 3] {
-        let srgb = Srgb::tables();
-        let place = |share: f32, count: u32| {
-            let at = (share * count as f32 - 0.5).clamp(0.0, (count - 1) as f32);
-            let first = at as usize;
-            (first, (first + 1).min(count as usize - 1), at - first as f32)
-        };
-        let (left, right, x) = place(uv.x, self.width);
-        let (upper, lower, y) = place(uv.y, self.height);
-        std::array::from_fn(|channel| {
-            let at =
-                |column: usize, row: usize| srgb.decode(self.rgba[4 * (row * self.width as usize + column) + channel]);
-            let along = |row: usize| at(left, row) + (at(right, row) - at(left, row)) * x;
-            along(upper) + (along(lower) - along(upper)) * y
-        })
-    }
 }

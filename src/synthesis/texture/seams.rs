@@ -1,134 +1,181 @@
-//! Makes both sides of every seam look the same.
+//! Makes all sides of every seam look the same.
 //!
-//! Texels of two charts lie at different places of the surface, so what a sampler interpolates between them differs a
-//! little along their common edge: the more, the larger the texels are beside the details, and so mainly on small levels.
-//! Texels at seams are changed as little as possible so that both sides agree at points half a texel apart (Sylvan,
-//! "Fixing texture seams with linear least-squares", 2014), by Kaczmarz' projections (1937): one point after the other,
-//! which converges to the nearest picture without seams.
+//! Along the border of a chart a sampler interpolates between texels of that chart, and on the other side of the edge
+//! between texels of another, which lie at other places of the surface. Both are exact; what lies between them is off
+//! by an eighth of the curvature in texels. No choice of samples makes two grids agree on details as small as a texel:
+//! vessels have to be smooth along the seam for both to show the same. So where there is a step, the texels that the
+//! seam's points see become the mean of what all sides show there: a blur by half a texel, along the seam and nowhere
+//! else. A few times are enough for the finest vessels. What is left, mainly where seams meet, is closed by adding to
+//! each texel what its points miss: least squares, as in Sylvan, "Fixing texture seams with linear least-squares"
+//! (2014). Faint or wide vessels are left as they are.
+//!
+//! All corners of the charts that meet at a vertex are one point. So the triangles around a pole, where a whole row of
+//! the texture is one place, agree too.
 
-use super::atlas::Seam;
+use super::atlas::Atlas;
+use super::bytes::{normal_bytes, normal_of};
 use super::canvas::Canvas;
 use super::maps::Level;
-use super::mips::normal_of;
-use super::paint::normal_bytes;
 use super::settings::MapKind;
 use super::srgb::Srgb;
-use crate::synthesis::pace::{Pace, STRETCH};
-use bevy_math::{DVec2, Mat3, Vec3};
+use crate::synthesis::pace::Pace;
+use bevy_math::{DVec2, Mat3, Quat, Vec3};
+use std::ops::Range;
 
 /// Points for a texel along an edge.
-const DENSITY: f64 = 2.0;
-/// Most sweeps over all points.
-const MOST_SWEEPS: usize = 60;
-/// Largest step, in shares of the range of values, that is left.
-const SMALL: f32 = 0.1 / 255.0;
-/// Step that counts as none.
-const NONE: f32 = 0.2 * SMALL;
+const DENSITY: f64 = 4.0;
+/// Largest step that is left, in 255ths of the range of values. Between the points it may be a little more.
+const SMALL: f32 = 0.75;
+/// Most times that texels are changed.
+const MOST_SWEEPS: u32 = 512;
+/// Of so many of them, the first ones blur, and the others close what is left.
+const ROUND: u32 = 64;
+const BLURS: u32 = 6;
+/// Share of the last change that a further one goes on with (Polyak's heavy ball, 1964).
+const MOMENTUM: f32 = 0.9;
+/// Least volume of a frame that spans space.
+const FLATTEST: f32 = 1.0e-4;
+/// Difference of weights that counts as none.
+const SAME: f32 = 1.0e-3;
 
-/// One side of a point: the texels that are interpolated, by their place in a list, and their weights.
+/// What a sampler sees at a place of the texture: texels, by their place in a list, and their weights.
 #[derive(Clone, Copy, Debug)]
-struct Side {
+struct View {
     texels: [u32; 4],
     weights: [f32; 4],
-}
-
-/// A point of a seam.
-#[derive(Clone, Copy, Debug)]
-struct Point {
-    sides: [Side; 2],
-    /// The seam, and the share of its edge.
-    seam: u32,
+    /// The edge that it lies on, and the share of it.
+    ends: [u32; 2],
     share: f32,
 }
 
-/// Points along the seams of a level, and the texels that they see.
+/// The points of all seams of a level, each with a view from every side.
+#[derive(Default)]
 struct Points {
-    points: Vec<Point>,
-    /// Texels, in rising order.
-    texels: Vec<u32>,
-    /// The points that see each texel, as a list of lists.
+    views: Vec<View>,
+    /// The first view of each point.
     starts: Vec<u32>,
-    seeing: Vec<u32>,
+    /// The point of each view.
+    points: Vec<u32>,
+    /// The texels that are seen.
+    texels: Vec<u32>,
+    /// The views that see each texel, with their weights, as a list of lists.
+    seeing_starts: Vec<u32>,
+    seeing: Vec<(u32, f32)>,
 }
 
-/// Makes both sides of all seams of a level look the same.
-pub(super) async fn close(level: &mut Level, canvas: &Canvas, seams: &[Seam], repeats: [bool; 2], pace: &Pace) {
-    let points = Points::along(canvas, seams, level.size, repeats, &pace.part(0.0..0.1)).await;
-    if points.points.is_empty() {
+/// From what a view sees to space, and back.
+struct Frame {
+    to_space: Mat3,
+    from_space: Mat3,
+}
+
+/// What is seen by each view, and its mean at each point.
+struct Shown {
+    means: Vec<Vec3>,
+    seen: Vec<Vec3>,
+}
+
+/// Makes all sides of the seams of a level look the same.
+pub(super) async fn close(level: &mut Level, canvas: &Canvas, atlas: &Atlas, pace: &Pace) {
+    let points = Points::of(canvas, atlas, level.size, &pace.part(0.0..0.2)).await;
+    if points.views.is_empty() {
         return;
     }
     let srgb = Srgb::tables();
-    let plain = |_: &Point| [Mat3::IDENTITY; 2];
-    let share = |number: usize| 0.1 + 0.225 * number as f32..0.1 + 0.225 * (number + 1) as f32;
+    let plain = |low: Vec3, high: Vec3| 255.0 * (high - low).max_element();
+    let share = |number: usize| pace.part(0.2 + 0.2 * number as f32..0.4 + 0.2 * number as f32);
     if let Some(map) = &mut level.maps[MapKind::Albedo as usize] {
         let get = |bytes: &[u8]| Vec3::from_array([bytes[0], bytes[1], bytes[2]].map(|byte| srgb.decode(byte)));
-        let values = points.values(map, 4, get);
-        let closed = points.closed(values, plain, &pace.part(share(0))).await;
-        points.write((map, 4), closed, |value| value.to_array().map(|channel| srgb.encode(channel)));
+        let step = |low: Vec3, high: Vec3| {
+            let [low, high] =
+                [low, high].map(|color| Vec3::from_array(color.to_array().map(|value| srgb.scale(value))));
+            (high - low).max_element()
+        };
+        let changed = points.agree(points.values(map, 4, get), &[], step, &share(0)).await;
+        points.write((map, 4), &changed, |value| value.to_array().map(|channel| srgb.encode(channel)));
     }
     if let Some(map) = &mut level.maps[MapKind::Normal as usize] {
-        let values = points.values(map, 4, normal_of);
-        let frames =
-            |point: &Point| seams[point.seam as usize].vertices(canvas).map(|ends| frame(canvas, ends, point.share));
-        let closed = points.closed(values, frames, &pace.part(share(1))).await;
-        points.write((map, 4), closed, |value| {
+        let frames = points.frames(canvas);
+        let step = |low: Vec3, high: Vec3| 127.5 * (high - low).max_element();
+        let changed = points.agree(points.values(map, 4, normal_of), &frames, step, &share(1)).await;
+        points.write((map, 4), &changed, |value| {
             let [x, y, z, _] = normal_bytes(value.normalize_or(Vec3::Z));
             [x, y, z]
         });
     }
     if let Some(map) = &mut level.maps[MapKind::Height as usize] {
         let get = |bytes: &[u8]| Vec3::splat(f32::from(u16::from_le_bytes([bytes[0], bytes[1]])) / 65535.0);
-        let values = points.values(map, 2, get);
-        let closed = points.closed(values, plain, &pace.part(share(2))).await;
-        points.write((map, 2), closed, |value| ((value.x.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16).to_le_bytes());
+        let changed = points.agree(points.values(map, 2, get), &[], plain, &share(2)).await;
+        points.write((map, 2), &changed, |value| ((value.x * 65535.0 + 0.5) as u16).to_le_bytes());
     }
     if let Some(map) = &mut level.maps[MapKind::Roughness as usize] {
-        let values = points.values(map, 4, |bytes| Vec3::splat(f32::from(bytes[1]) / 255.0));
-        let closed = points.closed(values, plain, &pace.part(share(3))).await;
-        points.write((map, 4), closed, |value| [255, (value.x.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]);
+        let get = |bytes: &[u8]| Vec3::splat(f32::from(bytes[1]) / 255.0);
+        let changed = points.agree(points.values(map, 4, get), &[], plain, &share(3)).await;
+        points.write((map, 4), &changed, |value| [255, (value.x * 255.0 + 0.5) as u8]);
     }
 }
 
 impl Points {
-    async fn along(canvas: &Canvas, seams: &[Seam], size: usize, repeats: [bool; 2], pace: &Pace) -> Self {
-        let mut points = Vec::new();
-        let add = |seam: usize| {
-            let ends = seams[seam].ends(canvas).map(|side| side.map(|uv| uv.as_dvec2() * size as f64));
-            let longest = ends.map(|[from, to]| from.distance(to)).into_iter().fold(0.0, f64::max);
-            let count = ((DENSITY * longest).ceil() as usize).max(1);
-            for number in 0..=count {
-                let share = number as f64 / count as f64;
-                let sides = ends.map(|[from, to]| Side::at(from.lerp(to, share), size, repeats));
-                if sides[0].texels != sides[1].texels || sides[0].differs(&sides[1]) {
-                    points.push(Point { sides, seam: seam as u32, share: share as f32 });
-                }
+    async fn of(canvas: &Canvas, atlas: &Atlas, size: usize, pace: &Pace) -> Self {
+        let mut points = Self { starts: vec![0], ..Self::default() };
+        let view = |[from, to]: [usize; 2], share: f64| {
+            let [a, b] = [from, to].map(|vertex| canvas.uvs[vertex].as_dvec2() * size as f64);
+            View::of(a.lerp(b, share), size, atlas.repeats, [from as u32, to as u32], share as f32)
+        };
+        let within = |seam: usize| {
+            let sides = atlas.seams[seam].vertices(canvas);
+            let length = |[from, to]: [usize; 2]| f64::from(canvas.uvs[from].distance(canvas.uvs[to]));
+            let longest = sides.map(length).into_iter().fold(0.0, f64::max);
+            let count = (DENSITY * longest * size as f64).ceil() as usize;
+            for number in 1..count {
+                points.push(sides.map(|side| view(side, number as f64 / count as f64)));
             }
         };
-        pace.part(0.0..0.5).each(seams.len(), add).await;
-        let sides = points.iter().flat_map(|point: &Point| point.sides);
-        let mut texels: Vec<u32> = sides.flat_map(|side| side.texels).collect();
-        texels.sort_unstable();
-        texels.dedup();
-        for texel in points.iter_mut().flat_map(|point| &mut point.sides).flat_map(|side| &mut side.texels) {
-            *texel = texels.partition_point(|other| other < texel) as u32;
+        pace.part(0.0..0.4).each(atlas.seams.len(), within).await;
+        for corners in atlas.seam_corners.chunk_by(|a, b| a[0] == b[0]) {
+            points.push(corners.iter().map(|&[_, vertex]| view([vertex as usize; 2], 0.0)));
         }
-        pace.rest(0.8).await;
-        let mut points = Self { points, starts: vec![0; texels.len() + 1], texels, seeing: Vec::new() };
-        points.list_seeing();
+        pace.rest(0.6).await;
+        points.list(size);
         pace.rest(1.0).await;
         points
     }
 
-    fn list_seeing(&mut self) {
-        let Self { points, texels, starts, seeing } = self;
-        points.iter().flat_map(Point::texels).for_each(|texel| starts[texel as usize + 1] += 1);
-        (0..texels.len()).for_each(|texel| starts[texel + 1] += starts[texel]);
-        seeing.resize(8 * points.len(), 0);
-        let mut next = starts.clone();
-        for (number, point) in points.iter().enumerate() {
-            for texel in point.texels() {
+    /// Adds a point, unless all its views are the same.
+    fn push(&mut self, views: impl IntoIterator<Item = View>) {
+        let first = self.views.len();
+        self.views.extend(views);
+        let (one, others) = (self.views[first], &self.views[first..]);
+        if others.iter().all(|other| other.is_like(&one)) {
+            self.views.truncate(first);
+        } else {
+            self.points.resize(self.views.len(), self.starts.len() as u32 - 1);
+            self.starts.push(self.views.len() as u32);
+        }
+    }
+
+    /// Lists the texels, and who sees them.
+    fn list(&mut self, size: usize) {
+        let Self { views, texels, seeing_starts, seeing, .. } = self;
+        // One more than the place of each texel in the list.
+        let mut places = vec![0u32; size * size];
+        for texel in views.iter_mut().flat_map(|view| &mut view.texels) {
+            let place = &mut places[*texel as usize];
+            if *place == 0 {
+                texels.push(*texel);
+                *place = texels.len() as u32;
+            }
+            *texel = *place - 1;
+        }
+        seeing_starts.resize(texels.len() + 1, 0);
+        views.iter().flat_map(|view| view.texels).for_each(|texel| seeing_starts[texel as usize + 1] += 1);
+        (0..texels.len()).for_each(|texel| seeing_starts[texel + 1] += seeing_starts[texel]);
+        seeing.resize(4 * views.len(), (0, 0.0));
+        let mut next = seeing_starts.clone();
+        for (number, view) in views.iter().enumerate() {
+            for (texel, weight) in view.texels.into_iter().zip(view.weights) {
                 let place = &mut next[texel as usize];
-                seeing[*place as usize] = number as u32;
+                seeing[*place as usize] = (number as u32, weight);
                 *place += 1;
             }
         }
@@ -138,118 +185,188 @@ impl Points {
         self.texels.iter().map(|&texel| get(&map[texel as usize * bytes..][..bytes])).collect()
     }
 
-    /// Writes back what has changed.
+    /// Writes the texels that have changed.
     fn write<const N: usize>(
         &self,
         (map, bytes): (&mut [u8], usize),
-        values: Option<Vec<Vec3>>,
+        changed: &[(u32, Vec3)],
         put: impl Fn(Vec3) -> [u8; N],
     ) {
-        for (&texel, value) in self.texels.iter().zip(values.into_iter().flatten()) {
-            map[texel as usize * bytes..][..N].copy_from_slice(&put(value));
+        for &(texel, value) in changed {
+            map[self.texels[texel as usize] as usize * bytes..][..N].copy_from_slice(&put(value));
         }
     }
 
-    /// The values with which both sides agree, or `None` if they did. `frames` turns the values of either side into ones
-    /// that can be compared.
-    async fn closed(
+    /// Changes texels until all sides agree. Returns those that have changed. `frames` turn what each view sees into
+    /// what can be compared; without any, it can be as it is. `step` measures the step between the least and the
+    /// greatest that a point shows.
+    async fn agree(
         &self,
         mut values: Vec<Vec3>,
-        frames: impl Fn(&Point) -> [Mat3; 2],
+        frames: &[Frame],
+        step: impl Fn(Vec3, Vec3) -> f32,
         pace: &Pace,
-    ) -> Option<Vec<Vec3>> {
-        let frames: Vec<[Mat3; 2]> = pace.part(0.0..0.1).collect(self.points.len(), |p| frames(&self.points[p])).await;
-        let (sweeps, last) = (pace.part(0.1..1.0), self.points.len() - 1);
-        // A point whose texels have not changed since it was projected needs no look.
-        let mut is_due = vec![true; self.points.len()];
-        for sweep in 0..MOST_SWEEPS {
-            let mut largest = 0.0f32;
-            let mut project = |number: usize| {
-                // There and back again, so that no direction is preferred.
-                let number = if sweep % 2 == 0 { number } else { last - number };
-                if !std::mem::replace(&mut is_due[number], false) {
-                    return;
-                }
-                let point = &self.points[number];
-                let step = point.project(&frames[number], &mut values);
-                if step > NONE {
-                    for texel in point.texels() {
-                        let [from, to] = [texel, texel + 1].map(|texel| self.starts[texel as usize] as usize);
-                        self.seeing[from..to].iter().for_each(|&other| is_due[other as usize] = true);
-                    }
-                    is_due[number] = false;
-                }
-                largest = largest.max(step);
-            };
-            let shares = sweep as f32 / MOST_SWEEPS as f32..(sweep + 1) as f32 / MOST_SWEEPS as f32;
-            sweeps.part(shares).stretches(self.points.len(), STRETCH, |some| some.for_each(&mut project)).await;
-            if largest <= SMALL {
-                return (sweep > 0).then_some(values);
+    ) -> Vec<(u32, Vec3)> {
+        let count = self.starts.len() - 1;
+        let mut shown = Shown { means: vec![Vec3::ZERO; count], seen: vec![Vec3::ZERO; self.views.len()] };
+        let (mut open, mut point) = (Vec::new(), 0);
+        let look = |_: usize| {
+            if shown.look(self, point, &values, frames, &step) > SMALL {
+                open.push(point);
             }
+            point += 1;
+        };
+        pace.part(0.0..0.5).each(count, look).await;
+        let (mut texel_marks, mut point_marks) = (Marks::of(self.texels.len()), Marks::of(count));
+        let mut changes = vec![(0, Vec3::ZERO); self.texels.len()];
+        let (mut has_changed, mut changed) = (vec![false; self.texels.len()], Vec::new());
+        for sweep in 0..MOST_SWEEPS {
+            if open.is_empty() {
+                break;
+            }
+            texel_marks.clear();
+            for texel in open.iter().flat_map(|&point| self.views_of(point)).flat_map(|view| self.views[view].texels) {
+                texel_marks.add(texel);
+            }
+            point_marks.clear();
+            for &texel in &texel_marks.marked {
+                let (value, last) = (&mut values[texel as usize], &mut changes[texel as usize]);
+                if sweep % ROUND < BLURS {
+                    *value = self.mean(texel, frames, |view| shown.means[self.points[view] as usize]);
+                } else {
+                    let missing = |view: usize| shown.means[self.points[view] as usize] - shown.seen[view];
+                    let goes_on = if last.0 + 1 == sweep { MOMENTUM * last.1 } else { Vec3::ZERO };
+                    *last = (sweep, self.mean(texel, frames, missing) + goes_on);
+                    *value += last.1;
+                }
+                self.seeing(texel).iter().for_each(|&(view, _)| point_marks.add(self.points[view as usize]));
+                if !std::mem::replace(&mut has_changed[texel as usize], true) {
+                    changed.push(texel);
+                }
+            }
+            open.clear();
+            let is_open = |point: &u32| shown.look(self, *point, &values, frames, &step) > SMALL;
+            open.extend(point_marks.marked.iter().copied().filter(is_open));
+            pace.rest(1.0 - 0.5 / (sweep + 2) as f32).await;
         }
-        Some(values)
+        changed.into_iter().map(|texel| (texel, values[texel as usize])).collect()
+    }
+
+    /// The mean of something over the views that see a texel, as that texel has it.
+    fn mean(&self, texel: u32, frames: &[Frame], of: impl Fn(usize) -> Vec3) -> Vec3 {
+        let (sum, weight) = self.seeing(texel).iter().fold((Vec3::ZERO, 0.0), |(sum, weight), &(view, own)| {
+            let value = of(view as usize);
+            let value = frames.get(view as usize).map_or(value, |frame| frame.from_space * value);
+            (sum + own * value, weight + own)
+        });
+        sum / weight.max(f32::MIN_POSITIVE)
+    }
+
+    fn views_of(&self, point: u32) -> Range<usize> {
+        self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize
+    }
+
+    fn seeing(&self, texel: u32) -> &[(u32, f32)] {
+        let [from, to] = [texel, texel + 1].map(|texel| self.seeing_starts[texel as usize] as usize);
+        &self.seeing[from..to]
+    }
+
+    /// For each view, the tangents as a renderer interpolates them, turned so that all views of a point have one
+    /// normal. So at a sharp edge the relief runs on, as if the surface were laid flat.
+    fn frames(&self, canvas: &Canvas) -> Vec<Frame> {
+        let mut frames = Vec::with_capacity(self.views.len());
+        for point in 0..self.starts.len() - 1 {
+            let views = &self.views[self.views_of(point as u32)];
+            let normal = |view: &View| {
+                let [from, to] = view.ends.map(|vertex| canvas.normals[vertex as usize]);
+                from.lerp(to, view.share)
+            };
+            let sum: Vec3 = views.iter().map(normal).sum();
+            frames.extend(views.iter().map(|view| {
+                let [from, to] = view.ends.map(|vertex| canvas.tangents[vertex as usize]);
+                let (own, tangent) = (normal(view), from.lerp(to, view.share));
+                let along = tangent.truncate();
+                let unit = own.normalize_or(Vec3::Z);
+                let turn = Mat3::from_quat(Quat::from_rotation_arc(unit, sum.normalize_or(unit)));
+                let to_space = turn * Mat3::from_cols(along, own.cross(along) * tangent.w, own);
+                let is_flat = !(to_space.determinant().abs() > FLATTEST);
+                let to_space = if is_flat { Mat3::IDENTITY } else { to_space };
+                Frame { to_space, from_space: to_space.inverse() }
+            }));
+        }
+        frames
     }
 }
 
-impl Side {
-    /// The texels that are interpolated at a point of the texture, in texels.
-    fn at(at: DVec2, size: usize, repeats: [bool; 2]) -> Self {
+impl Shown {
+    /// Looks at a point again. Returns the step between its views.
+    fn look(
+        &mut self,
+        points: &Points,
+        point: u32,
+        values: &[Vec3],
+        frames: &[Frame],
+        step: &impl Fn(Vec3, Vec3) -> f32,
+    ) -> f32 {
+        let views = points.views_of(point);
+        let (count, mut sum) = (views.len() as f32, Vec3::ZERO);
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for number in views {
+            let View { texels, weights, .. } = &points.views[number];
+            let seen = (0..4).fold(Vec3::ZERO, |sum, k| sum + values[texels[k] as usize] * weights[k]);
+            let seen = frames.get(number).map_or(seen, |frame| (frame.to_space * seen).normalize_or(Vec3::Z));
+            self.seen[number] = seen;
+            (sum, low, high) = (sum + seen, low.min(seen), high.max(seen));
+        }
+        self.means[point as usize] = sum / count;
+        step(low, high)
+    }
+}
+
+impl View {
+    fn of(at: DVec2, size: usize, repeats: [bool; 2], ends: [u32; 2], share: f32) -> Self {
         let first = (at - 0.5).floor();
-        let share = at - 0.5 - first;
+        let part = at - 0.5 - first;
         let place = |value: f64, axis: usize| {
             let (value, last) = (value as i64, size as i64 - 1);
             if repeats[axis] { value.rem_euclid(size as i64) } else { value.clamp(0, last) }
         };
         let texel = |right: f64, down: f64| (place(first.y + down, 1) * size as i64 + place(first.x + right, 0)) as u32;
-        let (x, y) = (share.x as f32, share.y as f32);
+        let (x, y) = (part.x as f32, part.y as f32);
         Self {
             texels: [texel(0.0, 0.0), texel(1.0, 0.0), texel(0.0, 1.0), texel(1.0, 1.0)],
             weights: [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y],
+            ends,
+            share,
         }
     }
 
-    /// Whether another side sees the same texels otherwise.
-    fn differs(&self, other: &Self) -> bool {
-        self.weights.iter().zip(other.weights).any(|(a, b)| (a - b).abs() > 1.0e-3)
-    }
-
-    fn value(&self, values: &[Vec3]) -> Vec3 {
-        self.texels.iter().zip(self.weights).map(|(&texel, weight)| values[texel as usize] * weight).sum()
-    }
-
-    fn add(&self, values: &mut [Vec3], change: Vec3) {
-        for (&texel, weight) in self.texels.iter().zip(self.weights) {
-            values[texel as usize] += change * weight;
-        }
+    /// Whether another one sees the same texels with the same weights.
+    fn is_like(&self, other: &Self) -> bool {
+        self.texels == other.texels && self.weights.iter().zip(other.weights).all(|(a, b)| (a - b).abs() < SAME)
     }
 }
 
-impl Point {
-    /// The texels of both sides.
-    fn texels(&self) -> impl Iterator<Item = u32> + use<> {
-        self.sides.into_iter().flat_map(|side| side.texels)
-    }
-
-    /// Makes both sides agree, with the least change. Returns the largest component of the step that there was.
-    fn project(&self, [one, other]: &[Mat3; 2], values: &mut [Vec3]) -> f32 {
-        let [first, second] = &self.sides;
-        let step = *one * first.value(values) - *other * second.value(values);
-        let largest = step.abs().max_element();
-        if largest > NONE {
-            let squares: f32 = first.weights.iter().chain(&second.weights).map(|weight| weight * weight).sum();
-            // The frames are rotations or nearly so, so that their transposes undo them.
-            first.add(values, one.transpose() * step * (-1.0 / squares));
-            second.add(values, other.transpose() * step * (1.0 / squares));
-        }
-        largest
-    }
+/// A set of numbers that is emptied often.
+struct Marks {
+    is_marked: Vec<bool>,
+    marked: Vec<u32>,
 }
 
-/// Tangent, bitangent and normal of one side at a share of its edge.
-fn frame(canvas: &Canvas, [from, to]: [usize; 2], share: f32) -> Mat3 {
-    let normal = canvas.normals[from].lerp(canvas.normals[to], share).normalize_or(Vec3::Z);
-    let along = canvas.tangents[from].lerp(canvas.tangents[to], share).truncate();
-    let tangent = (along - normal * normal.dot(along)).normalize_or(normal.any_orthonormal_vector());
-    let sign = if canvas.tangents[from].w < 0.0 { -1.0 } else { 1.0 };
-    Mat3::from_cols(tangent, normal.cross(tangent) * sign, normal)
+impl Marks {
+    fn of(count: usize) -> Self {
+        Self { is_marked: vec![false; count], marked: Vec::new() }
+    }
+
+    fn add(&mut self, number: u32) {
+        if !std::mem::replace(&mut self.is_marked[number as usize], true) {
+            self.marked.push(number);
+        }
+    }
+
+    fn clear(&mut self) {
+        for number in self.marked.drain(..) {
+            self.is_marked[number as usize] = false;
+        }
+    }
 }

@@ -50,6 +50,16 @@ impl Srgb {
         }
         byte as u8
     }
+
+    /// Linear light on the scale of the bytes, not rounded: straight between the limits of each.
+    pub fn scale(&self, value: f32) -> f32 {
+        let byte = self.encode(value) as usize;
+        let low = self.least[byte];
+        let high = self.least.get(byte + 1).copied().unwrap_or(1.0);
+        // Below the first and above the last byte there are only halves.
+        let (from, to) = ((byte as f32 - 0.5).max(0.0), (byte as f32 + 0.5).min(255.0));
+        from + (to - from) * ((value.clamp(low, high) - low) / (high - low))
+    }
 }
 
 #[cfg(test)]
@@ -67,6 +77,8 @@ mod tests {
             let exact = if value <= 0.003_130_8 { 12.92 * value } else { 1.055 * ops::powf(value, 1.0 / 2.4) - 0.055 };
             let byte = tables.encode(value);
             assert!((f32::from(byte) - 255.0 * exact).abs() < 0.501, "{byte} for {value}");
+            let scaled = tables.scale(value);
+            assert!((scaled - 255.0 * exact).abs() < 0.1, "{scaled} for {value}");
         }
         assert_eq!([tables.encode(-1.0), tables.encode(2.0), tables.encode(f32::NAN)], [0, 255, 0]);
     }

@@ -36,11 +36,6 @@ impl Placed {
         Self { corners, slopes }
     }
 
-    /// The corners, in texels.
-    pub fn corners(&self) -> [DVec2; 3] {
-        self.corners
-    }
-
     /// Weights of the corners at a point of the texture, in texels. They also hold beyond the triangle.
     pub fn weights(&self, at: DVec2) -> Vec3 {
         let from = at - self.corners[0];

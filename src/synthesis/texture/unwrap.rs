@@ -13,8 +13,8 @@ const PADDING: u32 = 4;
 impl Canvas {
     /// A canvas of a mesh that is cut into charts, each of which is laid flat, for a texture of so many texels.
     ///
-    /// Vertices along the cuts are there twice; [`sources`](Self::sources) says which vertex of the mesh each was. A mesh
-    /// with `normals`, one per vertex, keeps them; otherwise they are smooth.
+    /// Vertices along the cuts are there twice; [`sources`](Self::sources) says which vertex of the mesh each was. A
+    /// mesh with `normals`, one per vertex, keeps them; otherwise they are smooth.
     ///
     /// # Errors
     /// A size out of its limits, and normals that are not one per vertex.
@@ -44,11 +44,15 @@ impl Canvas {
         let normals = Some(sources.iter().map(|&vertex| smooth[vertex as usize]).collect());
         let positions = sources.iter().map(|&vertex| positions[vertex as usize].into()).collect();
         let checked = TriangleMesh::new_paced(positions, triangles, None, &pace.part(0.5..0.6)).await?;
-        let attributes = CanvasAttributes { uvs, normals, tangents: None };
+        let attributes = CanvasAttributes { uvs, normals, ..CanvasAttributes::default() };
         let canvas = Self::new_paced(checked, attributes, &pace.part(0.6..1.0)).await?;
         Ok(Self { sources: Some(sources), ..canvas })
     }
 }
+
+/// Triangles of the largest charts, if they are all of one size. Larger charts have fewer borders, and take longer to
+/// lay flat: each triangle the longer, the wider its chart.
+const CHART_TRIANGLES: f64 = 1000.0;
 
 /// Positions as they were, triangles of new vertices, and for each of these its old vertex and texture coordinates.
 type Unwrapped = (Vec<[f32; 3]>, Vec<[u32; 3]>, Vec<(u32, Vec2)>);
@@ -59,6 +63,7 @@ fn unwrap(mesh: &TriangleMesh, size: u32) -> Result<Unwrapped, BakeError> {
     let input = uvunwrap::MeshInput::new(&positions, &indices);
     let options = uvunwrap::Options {
         density: uvunwrap::Density::Auto { page_size: size },
+        max_chart_area: (mesh.area() * CHART_TRIANGLES / mesh.triangles().len() as f64) as f32,
         padding: PADDING.min(size / 16),
         packing: uvunwrap::Packing::Fast,
         ..uvunwrap::Options::default()
