@@ -18,13 +18,14 @@ use bevy::{
 };
 use bevy_vessels::synthesis::{
     organ::{Eye, EyeSettings},
-    recipe::{SCLERA_COLOR, conjunctiva},
+    recipe::conjunctiva,
     texture::{Bake, BakeSettings, BakedMap, Canvas, Layer, MapKind, TexelFormat},
     tissue::MeshSurface,
     tree::{VesselKind, VesselTree},
 };
 use clap::Parser;
 use common::{
+    light::moist_tissue,
     photo::{Shot, Shots},
     studio::{StatusLine, StudioArgs, StudioPlugin, View, moved, to_unit_size},
 };
@@ -94,7 +95,8 @@ fn paint(seed: u64, texels: u32) -> std::result::Result<(Eye, Bake), Box<dyn std
         grown.extend(tree.map(|tree| (tree, layer.look)));
     }
     let layers: Vec<Layer<'_>> = grown.iter().map(|(tree, look)| Layer { tree, look: look.clone() }).collect();
-    let settings = BakeSettings { size: texels, base_color: SCLERA_COLOR, ..default() };
+    // The colours of the eye's vertices are drawn, too.
+    let settings = BakeSettings { size: texels, base_color: [1.0; 3], ..default() };
     let bake = Bake::new(&Canvas::of_shaded(&eye.globe)?, &layers, None, &settings)?;
     Ok((eye, bake))
 }
@@ -126,11 +128,9 @@ fn show(
     let sclera = StandardMaterial {
         base_color_texture: texture(MapKind::Albedo),
         normal_map_texture: texture(MapKind::Normal),
-        perceptual_roughness: 0.35,
-        reflectance: 0.4,
         clearcoat: 0.8,
         clearcoat_perceptual_roughness: 0.08,
-        ..default()
+        ..moist_tissue(Color::WHITE)
     };
     let iris = StandardMaterial { perceptual_roughness: 0.7, ..default() };
     let cornea = StandardMaterial {
@@ -141,11 +141,8 @@ fn show(
         ..default()
     };
     if let Some(mut materials) = materials {
-        let mut globe: Mesh = eye.globe.clone().into();
-        // The texture has the colours.
-        globe.remove_attribute(Mesh::ATTRIBUTE_COLOR);
         for (name, mesh, material) in [
-            ("sclera", globe, sclera),
+            ("sclera", eye.globe.clone().into(), sclera),
             ("iris", eye.iris.clone().into(), iris),
             ("cornea", eye.cornea.clone().into(), cornea),
         ] {

@@ -24,7 +24,7 @@ use clap::Parser;
 use common::{
     controls::{ControlsPlugin, HELP, Organ, OrganAssets},
     photo::{Shot, Shots},
-    studio::{StudioArgs, StudioPlugin, View, to_unit_size},
+    studio::{StudioArgs, StudioPlugin, View, moved, to_unit_size, transform_of},
 };
 
 /// Organs along each side of the picture.
@@ -115,8 +115,8 @@ fn stouter(mut vessels: Vasculature, radii: f32) -> Vasculature {
 
 /// The transform that makes an organ one unit large, shows its front, and puts it in its cell.
 fn in_the_grid(mesh: &ShadedMesh, view: &Viewpoint, column: u64, row: u64) -> Transform {
-    let turn = Transform::from_translation(view.eye).looking_at(view.target, view.up).rotation.inverse();
     let sized = to_unit_size(mesh.bounds());
+    let turn = transform_of(&moved(view, &sized)).rotation.inverse();
     let cell = |index: u64| (index as f32 - 0.5 * (ACROSS - 1) as f32) * SPACING;
     Transform::from_translation(Vec3::new(cell(column), -cell(row), 0.0)) * Transform::from_rotation(turn) * sized
 }
