@@ -166,8 +166,8 @@ pub(crate) fn beside(act: impl FnOnce() + Send + 'static) -> bool {
     false
 }
 
-/// Does work that shares nothing, such as while it holds a lock: a thread that waits for others may take up any other work,
-/// and that may wait for the same lock.
+/// Does work that shares nothing, such as while it holds a lock: a thread that waits for others may take up any other
+/// work, and that may wait for the same lock.
 pub(crate) fn alone<R>(act: impl FnOnce() -> R) -> R {
     #[cfg(feature = "parallel")]
     let act = || threads::alone(act);
