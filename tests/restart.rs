@@ -2,6 +2,7 @@
 
 use bevy_math::{Vec3, bounding::Aabb3d};
 use bevy_vessels::synthesis::{
+    cco::{Cco, CcoSettings},
     colonization::{Colonization, ColonizationSettings},
     random::VesselRng,
     roots::{RootPlacement, RootPlacements, Roots},
@@ -13,7 +14,8 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-/// A disc that counts the questions to it but for samples, and may keep what is derived from it.
+/// A disc that counts the questions to it but for samples and depths, for which growth asks, and may keep what is
+/// derived from it.
 #[derive(Debug)]
 struct Counting {
     disc: Disc,
@@ -57,6 +59,10 @@ impl Tissue for Counting {
 
     fn sample(&self, rng: &mut VesselRng) -> Option<Vec3> {
         self.disc.sample(rng)
+    }
+
+    fn depth(&self, point: Vec3) -> Option<f32> {
+        self.disc.depth(point)
     }
 
     fn derived(&self) -> Option<&Derived> {
@@ -109,4 +115,28 @@ fn another_growth_on_a_tissue_that_keeps_what_is_derived_asks_it_next_to_nothing
         let alone = Colonization::new(Counting::new(None), settings.clone(), &roots, 1).expect("valid settings");
         assert_eq!(root(&alone), root(&first));
     }
+}
+
+#[test]
+fn optimisation_starts_again_without_asking_either() {
+    let settings = CcoSettings { terminals: 20, ..CcoSettings::default() };
+    let roots = |reach| {
+        let artery = RootPlacement::Within(reach);
+        RootPlacements { artery, vein: RootPlacement::None, ..RootPlacements::default() }.into()
+    };
+    let root = |growth: &Cco| growth.tree(VesselKind::Artery).positions()[0];
+    let tissue = Counting::new(None);
+    let mut growth = Cco::new(tissue.clone(), settings.clone(), &roots(0.3), 1).expect("a growth");
+    assert!(tissue.asked() > FEW);
+    let first = root(&growth);
+    growth.restart(settings.clone(), &roots(0.3), 2).expect("a growth");
+    assert!(tissue.asked() < FEW);
+    assert_ne!(root(&growth), first);
+    // A tissue that keeps what is derived serves another growth, too.
+    let tissue = Counting::new(Some(Derived::default()));
+    let start = |seed| Cco::new(tissue.clone(), settings.clone(), &roots(0.3), seed).expect("a growth");
+    assert_eq!(root(&start(1)), first);
+    assert!(tissue.asked() > FEW);
+    assert_ne!(root(&start(2)), first);
+    assert!(tissue.asked() < FEW);
 }

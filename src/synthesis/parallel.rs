@@ -7,16 +7,15 @@ const WORTH_WAKING: usize = 2048;
 
 #[cfg(feature = "parallel")]
 mod threads {
-    use rayon::Yield;
     use std::cell::Cell;
-    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+    use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::{Mutex, PoisonError};
 
     /// Shares of the work for each thread: enough to balance shares that take longer than others.
     const SHARES: usize = 8;
     /// Number of times that a thread checks whether the others are done before it sleeps: some tenths of a millisecond.
     /// Waking takes nearly as long.
-    const PATIENCE: usize = 4096;
+    const PATIENCE: usize = 16_384;
 
     thread_local! {
         /// Whether this thread shares no work for now.
@@ -46,26 +45,38 @@ mod threads {
         (threads > 1 && items >= 2 * least).then(|| items.div_ceil(SHARES * threads).max(least.div_ceil(4)))
     }
 
-    /// Does `count` shares of work. Threads take the next share in turn.
-    pub fn take_turns<S: Send>(count: usize, shares: impl Iterator<Item = S> + Send, act: impl Fn(S) + Sync) {
-        let (shares, unfinished) = (Mutex::new(shares), AtomicUsize::new(count));
+    /// Does `own` work, and `count` shares of other work. Threads take the next share in turn. Returns whether none was
+    /// so late that this one had to wait.
+    pub fn take_turns<S: Send>(
+        count: usize,
+        shares: impl Iterator<Item = S> + Send,
+        act: impl Fn(S) + Sync,
+        own: impl FnOnce() + Send,
+    ) -> bool {
+        let (shares, inside) = (Mutex::new(shares), AtomicUsize::new(0));
         // The lock is held only while the next share is taken.
         let next = || shares.lock().unwrap_or_else(PoisonError::into_inner).next();
         let work = || {
             while let Some(share) = next() {
                 act(share);
-                unfinished.fetch_sub(1, Ordering::Release);
             }
+        };
+        let help = || {
+            inside.fetch_add(1, Ordering::AcqRel);
+            work();
+            inside.fetch_sub(1, Ordering::AcqRel);
         };
         let lead = || {
+            own();
             work();
-            let mut tries = 0;
-            while unfinished.load(Ordering::Acquire) > 0 && tries < PATIENCE {
-                tries += 1;
+            // All shares are taken, so whoever is inside does the last ones.
+            let are_done = |_: &usize| {
                 std::hint::spin_loop();
-            }
+                inside.load(Ordering::Acquire) == 0
+            };
+            (0..PATIENCE).find(are_done).is_some()
         };
-        rayon::join(lead, || on_threads(count.min(rayon::current_num_threads()) - 1, &work));
+        rayon::join(lead, || on_threads(count.min(rayon::current_num_threads()) - 1, &help)).0
     }
 
     /// Does the same work on several threads at once.
@@ -76,54 +87,71 @@ mod threads {
             work();
         }
     }
-
-    /// A flag for the end of some work, also when it ends by a panic, so that no thread waits forever.
-    #[derive(Default)]
-    pub struct Over(AtomicBool);
-
-    impl Over {
-        /// Does some work and sets the flag afterwards.
-        pub fn after<R>(&self, act: impl FnOnce() -> R) -> R {
-            struct Says<'a>(&'a AtomicBool);
-            impl Drop for Says<'_> {
-                fn drop(&mut self) {
-                    self.0.store(true, Ordering::Release);
-                }
-            }
-            let _says = Says(&self.0);
-            act()
-        }
-
-        /// Stays awake until the flag is set, and does other work meanwhile.
-        pub fn stand_by(&self) {
-            while !self.0.load(Ordering::Acquire) {
-                if rayon::yield_now() != Some(Yield::Executed) {
-                    std::hint::spin_loop();
-                }
-            }
-        }
-    }
 }
 
 /// Calls `act` for every item and its index. Each item is worth a thread of its own.
 pub(crate) fn for_each<T: Send>(items: &mut [T], act: impl Fn(usize, &mut T) + Sync) {
     #[cfg(feature = "parallel")]
     if items.len() > 1 && threads::count() > 1 {
-        threads::take_turns(items.len(), items.iter_mut().enumerate(), |(index, item)| act(index, item));
+        threads::take_turns(items.len(), items.iter_mut().enumerate(), |(index, item)| act(index, item), || ());
         return;
     }
     items.iter_mut().enumerate().for_each(|(index, item)| act(index, item));
 }
 
-/// Does work that shares small parts now and then, while another thread stays awake to take them at once. Waking it
-/// each time would take as long as a step.
-pub(crate) fn with_company<R: Send>(act: impl FnOnce() -> R + Send) -> R {
-    #[cfg(feature = "parallel")]
-    if threads::count() > 1 {
-        let over = threads::Over::default();
-        return rayon::join(|| over.after(act), || over.stand_by()).0;
+/// Help by other threads with small parts of long work.
+///
+/// A thread beside other programs may lose its turn in the middle of an item, and then all wait for it. So after a part
+/// with a late thread, some parts are done without any, twice as many each time that this happens. Where threads are
+/// hardly ever late, that is soon forgotten.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Help {
+    /// Parts still to be done without.
+    without: u32,
+    /// Parts that were done without, after the last time that a thread was late.
+    pause: u32,
+}
+
+#[cfg_attr(not(feature = "parallel"), expect(dead_code, reason = "there is no other thread"))]
+impl Help {
+    /// Fewest and most parts that are done without help after a thread was late.
+    const PAUSES: [u32; 2] = [64, 4096];
+    /// A part in time takes this share off the pause. So pauses become longer if more than one part in fifty is late,
+    /// which costs as much as help gains.
+    const FORGOTTEN: u32 = 64;
+
+    /// Does `own`, and calls `act` for every item and its index: at the same time, if there is help.
+    pub fn for_each<T: Send>(
+        &mut self,
+        items: &mut [T],
+        act: impl Fn(usize, &mut T) + Sync,
+        own: impl FnOnce() + Send,
+    ) {
+        #[cfg(feature = "parallel")]
+        if items.len() > 1 && threads::count() > 1 && self.is_due() {
+            let shares = items.iter_mut().enumerate();
+            let in_time = threads::take_turns(shares.len(), shares, |(index, item)| act(index, item), own);
+            return self.learn(in_time);
+        }
+        own();
+        items.iter_mut().enumerate().for_each(|(index, item)| act(index, item));
     }
-    act()
+
+    /// Whether the next part may be shared.
+    fn is_due(&mut self) -> bool {
+        let is_due = self.without == 0;
+        self.without = self.without.saturating_sub(1);
+        is_due
+    }
+
+    fn learn(&mut self, in_time: bool) {
+        if in_time {
+            self.pause -= self.pause.div_ceil(Self::FORGOTTEN);
+        } else {
+            self.pause = (2 * self.pause).clamp(Self::PAUSES[0], Self::PAUSES[1]);
+            self.without = self.pause;
+        }
+    }
 }
 
 /// Starts work on another thread, if there is one, and tells whether there is. Nobody waits for it. A panic ends it.
@@ -138,8 +166,8 @@ pub(crate) fn beside(act: impl FnOnce() + Send + 'static) -> bool {
     false
 }
 
-/// Does work that shares nothing, such as while it holds a lock: a thread that waits for others may take up any other work,
-/// and that may wait for the same lock.
+/// Does work that shares nothing, such as while it holds a lock: a thread that waits for others may take up any other
+/// work, and that may wait for the same lock.
 pub(crate) fn alone<R>(act: impl FnOnce() -> R) -> R {
     #[cfg(feature = "parallel")]
     let act = || threads::alone(act);
@@ -211,7 +239,12 @@ where
     #[cfg(feature = "parallel")]
     if let Some(share) = threads::share_of(inputs.len(), least) {
         let shares = inputs.chunks(share).zip(outputs.chunks_mut(share)).enumerate();
-        threads::take_turns(shares.len(), shares, |(number, (inputs, outputs))| act(number * share, inputs, outputs));
+        threads::take_turns(
+            shares.len(),
+            shares,
+            |(number, (inputs, outputs))| act(number * share, inputs, outputs),
+            || (),
+        );
         return;
     }
     act(0, inputs, outputs);
@@ -232,14 +265,15 @@ mod tests {
         for threads in [1, 2, 3, 8] {
             on(threads, || {
                 let (mut outputs, mut counts) = (Vec::new(), vec![0u32; 37]);
-                with_company(|| {
-                    for _ in 0..20 {
-                        map_into(&inputs, &mut outputs, 0, |&input| input * 2);
-                        for_each(&mut counts, |index, count| *count += index as u32);
-                    }
-                });
+                let (mut help, mut own) = (Help::default(), 0);
+                for _ in 0..20 {
+                    map_into(&inputs, &mut outputs, 0, |&input| input * 2);
+                    for_each(&mut counts, |index, count| *count += index as u32);
+                    help.for_each(&mut counts, |index, count| *count += index as u32, || own += 1);
+                }
                 assert!(outputs.iter().zip(&inputs).all(|(&output, &input)| output == 2 * input));
-                assert!(counts.iter().enumerate().all(|(index, &count)| count == 20 * index as u32));
+                assert!(counts.iter().enumerate().all(|(index, &count)| count == 40 * index as u32));
+                assert_eq!(own, 20);
                 assert_eq!(within_pool(|| 1), 1);
                 assert!(!alone(|| beside(|| ())));
             });
@@ -252,11 +286,35 @@ mod tests {
         for threads in [1, 2] {
             on(threads, || {
                 assert_eq!(beside(|| panic!("expected by the test")), threads > 1);
-                assert!(panics(&|| with_company(|| panic!("expected by the test"))));
                 assert!(panics(&|| within_pool(|| panic!("expected by the test"))));
                 let fails = |index: usize, _: &mut u32| assert!(index != 20, "expected by the test");
                 assert!(panics(&|| for_each(&mut [0; 40], fails)));
+                assert!(panics(&|| Help::default().for_each(&mut [0; 40], fails, || ())));
+                let leaves = || panic!("expected by the test");
+                assert!(panics(&|| Help::default().for_each(&mut [0; 40], |_, _| (), leaves)));
             });
         }
+    }
+    #[test]
+    fn parts_are_done_alone_after_a_late_one_until_that_is_forgotten() {
+        let mut help = Help::default();
+        let alone = |help: &mut Help| (0..).take_while(|_| !help.is_due()).count();
+        assert_eq!(alone(&mut help), 0);
+        // Twice as many each time, up to a limit.
+        for pause in [64, 128, 256, 512] {
+            help.learn(false);
+            assert_eq!(alone(&mut help), pause);
+        }
+        (0..20).for_each(|_| help.learn(false));
+        assert_eq!(alone(&mut help), 4096);
+        // Forgotten after some hundred parts in time.
+        (0..600).for_each(|_| help.learn(true));
+        assert_eq!((alone(&mut help), help.pause), (0, 0));
+        // With one late part in twenty, help is hardly ever asked for.
+        for part in 0..400 {
+            alone(&mut help);
+            help.learn(part % 20 > 0);
+        }
+        assert!(help.pause > 2048, "{}", help.pause);
     }
 }

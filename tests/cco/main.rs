@@ -9,6 +9,7 @@ mod no_go;
 mod oracle;
 mod organs;
 mod quality;
+mod radii;
 mod requests;
 mod steps;
 

@@ -10,6 +10,7 @@
 //! terminal's turn comes, the terminal is ranked anew.
 
 use super::{
+    clearance::APART,
     distance::squared_to_segment,
     forest::NONE,
     joint::{Joint, JointSums},
@@ -17,6 +18,7 @@ use super::{
     space::Space,
     sums::{Below, Slope},
 };
+use crate::synthesis::segment_index::round_cone::RoundCone;
 use bevy_math::DVec3;
 
 /// How much more a search may gain than its first step promises, for a bound. A test compares the choices with those of
@@ -216,9 +218,24 @@ impl Space {
         let is_long = |(fourth, length): (f64, f64)| 16.0 * fourth <= (length * length) * (length * length);
         let before = forest.node(self.root_segment(node.tree)).volume;
         let cost = ascent.root.volume - before;
-        let are_long = [trunk, child(0), child(1)].into_iter().zip(sums.lengths).all(is_long);
+        let fourths = [trunk, child(0), child(1)];
+        let are_long = fourths.into_iter().zip(sums.lengths).all(is_long);
         let ends = [joint.ends[0], joint.ends[1]];
-        (are_long && cost.is_finite()).then_some(Candidate { segment: *segment, ends, place, cost })
+        let is_good = are_long && cost.is_finite() && self.are_inside(guess, place, fourths);
+        is_good.then_some(Candidate { segment: *segment, ends, place, cost })
+    }
+
+    /// Whether three segments to a place, as cylinders of these radii to the fourth, would be inside the tissue. Where
+    /// they are not, there is no need to try; and what this finds out about the border serves those who try.
+    fn are_inside(&self, guess: &Guess, place: DVec3, fourths: [f64; 3]) -> bool {
+        let is_inside = |(end, fourth): (DVec3, f64)| {
+            let radius = APART * fourth.sqrt().sqrt();
+            self.domain.holds(&RoundCone { start: place, end, start_radius: radius, end_radius: radius }, false)
+        };
+        // An entrance need not be inside with all its length.
+        let parent = self.forest.node(guess.segment).parent;
+        let first = usize::from(self.forest.node(parent).parent == NONE);
+        guess.joint.ends.into_iter().zip(fourths).skip(first).all(is_inside)
     }
 
     /// Whether a segment has these ends.

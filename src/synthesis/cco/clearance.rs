@@ -1,9 +1,9 @@
 //! No two segments of any trees overlap, unless they share a node, and none leaves the tissue.
 //!
-//! A segment is the round cone that it is drawn and meshed as: it begins wider than it ends, with its parent's radius or
-//! [`FLARE`] times its own, whichever is less. Only a root's segment is a cylinder. The ratio of both radii, its *flare*,
-//! changes with every terminal, too. So a segment has room for a flare 5 % above its own, and is looked at again when
-//! its start has outgrown that.
+//! A segment is the round cone that it is drawn and meshed as: it begins wider than it ends, with its parent's radius
+//! or [`FLARE`] times its own, whichever is less. Only a root's segment is a cylinder. The ratio of both radii, its
+//! *flare*, changes with every terminal, too. So a segment has room for a flare 5 % above its own, and is looked at
+//! again when its start has outgrown that.
 //!
 //! A new terminal changes the radii of all segments of its tree a little, so a look at the new ones is not enough.
 //! Every segment has a *bound*: a radius that it may have without touching others at theirs, or the border. Each
@@ -24,7 +24,7 @@ use crate::synthesis::segment_index::round_cone::RoundCone;
 
 /// Least distance between two segments, as a multiple of the sum of their radii. It is above 1 by more than the
 /// rounding of a tree in f32.
-const APART: f64 = 1.0 + 2.0e-6;
+pub(super) const APART: f64 = 1.0 + 2.0e-6;
 /// Least length of a new segment, in radii.
 const LEAST_LENGTH: f64 = 2.0;
 

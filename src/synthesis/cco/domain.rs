@@ -3,11 +3,10 @@
 //! Depths of a mesh are searched for, so the domain keeps some of them, which bound all others. Only where the bounds
 //! do not decide, near the border, the mesh is asked.
 
-use super::depths::Depths;
-use super::{error::CcoError, power::cube_root, settings::CcoSettings};
+use super::{depths::Depths, error::CcoError, power::cube_root, settings::CcoSettings};
 use crate::synthesis::{
     segment_index::round_cone::RoundCone,
-    tissue::{Extent, Tissue},
+    tissue::{Derived, Extent, Tissue},
 };
 use bevy_math::{DVec3, Vec3};
 use std::sync::Arc;
@@ -37,6 +36,8 @@ pub(super) struct Domain {
     /// Distance that vessels keep from the border.
     pub border: f64,
     depths: Option<Arc<Depths>>,
+    /// What was derived from the tissue, if it keeps nothing itself.
+    pub derived: Derived,
 }
 
 impl Domain {
@@ -88,7 +89,7 @@ impl Domain {
         }
         let corner = axes[0] * low.x + axes[1] * low.y + axes[2] * low.z;
         let depths = tissue.depth_is_searched().then(|| Arc::new(Depths::new(&*tissue, min, max)));
-        Ok(Self { tissue, dimension, measure, corner, axes, sides, border: 0.0, depths })
+        Ok(Self { tissue, dimension, measure, corner, axes, sides, border: 0.0, depths, derived: Derived::default() })
     }
 
     pub(super) fn tissue(&self) -> &Arc<dyn Tissue> {

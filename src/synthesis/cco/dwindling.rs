@@ -1,7 +1,8 @@
 //! A list of ascending numbers that is made once, and then loses one number after the other.
 //!
 //! In a tissue that fills there are twenty vacant cells or more for each terminal. They lie in runs, so a bit for each
-//! is enough, with the place in the list of every 64th. A number that takes the place of a removed one is kept in a map.
+//! is enough, with the place in the list of every 64th. A number that takes the place of a removed one is kept in a
+//! map.
 
 use super::cell_map::CellMap;
 

@@ -12,8 +12,10 @@ use super::{
 };
 use bevy_math::{DMat3, DVec3};
 
-/// Most steps of the search. Newton's method takes three to five.
-const MOST_STEPS: usize = 100;
+/// Places that a search has looked at before its last step, at most. Newton's method takes three to five steps, nearly
+/// all of them whole. Where the flows or radii are so different that rounding hides what a step gains, it may take any
+/// number.
+const MOST_LOOKS: usize = 256;
 /// Length of a segment, as a share of the longest, below which the best place may be its end itself, where the volume
 /// has a cusp that steps approach slowly.
 const NEAR_END: f64 = 0.15;
@@ -95,34 +97,42 @@ impl Joint {
     /// against the gradient, and is halved while it does not lower the volume: the result is never worse than the
     /// start. The search ends when a step would gain less than `tolerance` times what the second child's segment costs.
     pub(super) fn settle(&self, start: DVec3, at_start: &JointSums, slope: &Slope, tolerance: f64) -> DVec3 {
+        self.descend(start, at_start, slope, tolerance).0
+    }
+
+    /// The same with the number of places that were looked at.
+    fn descend(&self, start: DVec3, at_start: &JointSums, slope: &Slope, tolerance: f64) -> (DVec3, usize) {
         let cost = |sums: &JointSums| slope.load * sums.trunk.load + slope.volume * sums.trunk.volume;
         let (mut place, mut sums) = (start, *at_start);
-        let (mut least, mut steps_at_end) = (cost(&sums), 0);
+        let (mut least, mut steps_at_end, mut looks) = (cost(&sums), 0, 0);
         // A segment without load pulls without limit at its end, which tells nothing.
         let mut is_told = [false, self.below[0].load == 0.0, self.below[1].load == 0.0];
-        for _ in 0..MOST_STEPS {
+        while looks < MOST_LOOKS {
             let Some(Step { way, plain, gain, scale }) = self.step(place, &sums, slope) else { break };
             if gain <= tolerance * scale {
                 break;
             }
             let shares = || std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
             let tries = shares().map(|share| way * share).chain(shares().map(|share| plain * share));
-            let found =
-                tries.map(|step| (place + step, self.sums(place + step))).find(|(_, there)| cost(there) < least);
+            let look = |step: DVec3| {
+                looks += 1;
+                (place + step, self.sums(place + step))
+            };
+            let found = tries.map(look).find(|(_, there)| cost(there) < least);
             let Some((next, there)) = found else { break };
             (place, sums, least) = (next, there, cost(&there));
             let longest = sums.lengths.into_iter().fold(0.0, f64::max);
             let is_near = |end: &usize| sums.lengths[*end] < NEAR_END * longest;
             let Some(end) = (0..3).find(is_near) else { continue };
             if !std::mem::replace(&mut is_told[end], true) && self.rests_at(end, slope) {
-                return self.ends[end];
+                return (self.ends[end], looks);
             }
             steps_at_end += usize::from(sums.lengths[end] < AT_END * longest);
             if steps_at_end > STEPS_AT_END {
                 break;
             }
         }
-        place
+        (place, looks)
     }
 
     /// Whether the joint would stay at an end: the others pull clearly less than that end does.

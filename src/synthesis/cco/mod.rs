@@ -20,8 +20,8 @@
 //! and meshed as, which begins up to [`MAX_FLARE`] times as wide as it ends. So vessels that are drawn don't overlap
 //! either.
 //!
-//! A no-go region is avoided exactly. A function and painted vertices are asked along a segment, at least every 512th of
-//! the tissue's diagonal: what is narrower may be crossed.
+//! A no-go region is avoided exactly. A function and painted vertices are asked along a segment, at least every 512th
+//! of the tissue's diagonal: what is narrower may be crossed.
 //!
 //! [`MAX_FLARE`]: crate::synthesis::segment_index::MAX_FLARE
 //!
@@ -62,7 +62,7 @@ pub use settings::{CcoSettings, VesselFlow};
 
 use crate::synthesis::{
     growth::StepCount,
-    parallel,
+    parallel::{self, Help},
     random::{Stream, VesselRng},
     roots::Roots,
     tissue::{Tissue, TissuePoint},
@@ -77,7 +77,7 @@ use std::sync::Arc;
 use system::System;
 
 /// Nodes that a step of polishing looks at.
-const POLISHED: u32 = 64;
+const POLISHED: u32 = 128;
 /// Number of nodes after which all bifurcations are polished for the first time. That is done again whenever the
 /// number has doubled, since later terminals join better trees then.
 const FIRST_SWEEP: usize = 64;
@@ -123,6 +123,7 @@ pub struct Cco {
     polished: [u32; 2],
     /// Number of nodes from which on a sweep is due while the trees grow.
     due: usize,
+    help: Help,
     grown: ByKind<Option<Grown>>,
     /// Links between the terminals of arteries and veins, once all are placed.
     links: Vec<BedLink>,
@@ -133,8 +134,9 @@ impl Cco {
     /// see [`CcoSettings::fit`].
     ///
     /// # Errors
-    /// A setting outside its limits; a tissue that is neither flat nor solid, or too far from the origin; roots that cannot be placed as requested,
-    /// that have no room for a vessel, or of which there are none; a given tree that is no binary one, or overlaps.
+    /// A setting outside its limits; a tissue that is neither flat nor solid, or too far from the origin; roots that
+    /// cannot be placed as requested, that have no room for a vessel, or of which there are none; a given tree that is
+    /// no binary one, or overlaps.
     pub fn new(tissue: Arc<dyn Tissue>, settings: CcoSettings, roots: &Roots, seed: u64) -> Result<Self, CcoError> {
         settings.validate()?;
         Self::on(Domain::new(tissue)?, settings, roots, seed)
@@ -153,7 +155,7 @@ impl Cco {
     fn on(mut domain: Domain, settings: CcoSettings, roots: &Roots, seed: u64) -> Result<Self, CcoError> {
         domain.border = settings.border_distance.into();
         let tissue = domain.tissue();
-        let placed = roots.resolve(&**tissue, &settings.root_spacing(tissue.extent()), seed)?;
+        let placed = roots.resolve_with(&**tissue, &settings.root_spacing(tissue.extent()), seed, &domain.derived)?;
         let exponent = Exponent::new(settings.bifurcation_exponent.into());
         let mut growth = Self {
             space: Space::new(domain, Forest::new(exponent)),
@@ -162,6 +164,7 @@ impl Cco {
             steps: 0,
             polished: [0; 2],
             due: FIRST_SWEEP,
+            help: Help::default(),
             grown: ByKind::default(),
             links: Vec::new(),
             settings,
@@ -236,9 +239,7 @@ impl Cco {
         let nodes = self.space.forest.nodes.len();
         let [node, sweeps] = &mut self.polished;
         let end = (nodes as u32).min(*node + POLISHED);
-        for node in *node..end {
-            self.space.polish(node, self.settings.tolerance.into());
-        }
+        self.space.polish(*node..end, self.settings.tolerance.into(), &mut self.help);
         *node = end;
         if end as usize == nodes {
             *node = 0;
@@ -256,7 +257,7 @@ impl Cco {
     /// # Errors
     /// [`CcoError::NoRoom`] if there was no room for all terminals. The trees with those that were placed stay.
     pub fn run(&mut self) -> Result<(), CcoError> {
-        parallel::with_company(|| {
+        parallel::within_pool(|| {
             while !self.is_finished() {
                 self.advance();
             }

@@ -10,13 +10,13 @@ use super::{
     vacancy::Vacancy,
 };
 use crate::synthesis::{
-    parallel,
+    parallel::Help,
     random::VesselRng,
     tree::{VesselKind, VesselTree},
 };
 use bevy_math::{DVec3, Vec3};
 use rand::RngExt;
-use std::f64::consts::PI;
+use std::{f64::consts::PI, mem::take};
 
 /// Places from which the end of the first vessel is chosen.
 const FIRST_PLACES: usize = 64;
@@ -30,10 +30,10 @@ const MOST_REFUSED: u32 = 500;
 
 /// Refused terminals after which a segment that no move gave room is looked at again.
 const PATIENCE: u64 = 40;
-/// Terminals from which on several are ranked at a time: the trees then hardly change meanwhile.
-const FIRST_BATCH: u32 = 256;
-/// Terminals that are ranked at a time.
-const BATCH: usize = 8;
+/// Terminals that are ranked at a time, as a share of those that are there: the trees then hardly change meanwhile.
+const BATCH_SHARE: u32 = 32;
+/// Most of them: growth may have to end within a frame.
+const MOST_IN_BATCH: u32 = 16;
 
 /// A terminal to be connected.
 #[derive(Clone, Debug, Default)]
@@ -63,6 +63,11 @@ pub(super) struct System {
     /// The next terminals, the last of them first, and their number.
     plans: Vec<Plan>,
     planned: usize,
+    /// Places of the terminals that were ranked last, and those for the terminals after them.
+    places: Vec<DVec3>,
+    /// Number of terminals that were ranked last.
+    batch: usize,
+    help: Help,
     /// Excess of the next terminal's flow over the mean, if that is decided, in units.
     excess: Option<f64>,
     /// Segments that no move gave room, and the number of refused terminals then.
@@ -89,6 +94,9 @@ impl System {
             vacancy: Vacancy::new(domain, settings.terminals),
             plans: Vec::new(),
             planned: 0,
+            places: Vec::new(),
+            batch: 0,
+            help: Help::default(),
             excess: None,
             stuck: Vec::new(),
             unit,
@@ -103,7 +111,9 @@ impl System {
         self.unit / growth
     }
 
-    fn set_unit(&self, space: &mut Space, unit: f64) {
+    /// Sets the unit for so many terminals.
+    fn set_unit(&self, space: &mut Space, terminals: u32, settings: &CcoSettings) {
+        let unit = self.unit_at(&space.domain, terminals, settings);
         for &tree in &self.trees {
             space.unit[tree as usize] = unit;
         }
@@ -185,7 +195,7 @@ impl System {
             if space.is_long_enough(segment, f64::INFINITY) && space.has_room(&[segment]) {
                 self.trees.push(space.forest.node(segment).tree);
                 self.count(&space.domain, place);
-                self.set_unit(space, unit);
+                self.set_unit(space, self.terminals, settings);
                 return Ok(());
             }
             space.uproot();
@@ -201,12 +211,12 @@ impl System {
     /// Connects the next terminal, if that is possible. Returns whether it was.
     pub(super) fn advance(&mut self, space: &mut Space, settings: &CcoSettings, rng: &mut VesselRng) -> bool {
         if self.planned == 0 && !self.plan(space, settings, rng) {
+            self.set_unit(space, self.terminals, settings);
             self.is_stuck = true;
             return false;
         }
         self.planned -= 1;
-        let mut plan = std::mem::take(&mut self.plans[self.planned]);
-        let old = space.unit[self.trees[0] as usize];
+        let mut plan = take(&mut self.plans[self.planned]);
         self.prepare(space, settings, rng);
         let is_joined = self.join(space, &mut plan, settings);
         if is_joined {
@@ -214,9 +224,11 @@ impl System {
             self.refused = 0;
             if self.is_done(settings) {
                 self.vacancy.close();
+                self.plans = Vec::new();
+                return true;
             }
         } else {
-            self.set_unit(space, old);
+            self.set_unit(space, self.terminals, settings);
             self.relieve(space);
             self.vacancy.refuse();
             self.rejected += 1;
@@ -229,34 +241,51 @@ impl System {
 
     /// Sets up the space for the next terminal.
     fn prepare(&mut self, space: &mut Space, settings: &CcoSettings, rng: &mut VesselRng) {
-        self.set_unit(space, self.unit_at(&space.domain, self.terminals + 1, settings));
+        self.set_unit(space, self.terminals + 1, settings);
         space.share = self.share(settings, rng);
         space.blocked = None;
         let share = f64::from(self.terminals) / f64::from(settings.terminals);
         space.reserve = 1.0 + RESERVE * (1.0 - share);
     }
 
-    /// Draws places for some terminals, and ranks their candidates, on all threads. Their number depends on that of the
-    /// terminals alone, so the result is the same on any number of threads. `false` if there is no place.
+    /// Ranks the candidates of some terminals, on all threads, while places for those after them are drawn. Their
+    /// number depends on that of the terminals alone, so the result is the same on any number of threads. `false` if
+    /// there is no place.
     fn plan(&mut self, space: &mut Space, settings: &CcoSettings, rng: &mut VesselRng) -> bool {
-        let is_early = self.terminals < FIRST_BATCH || settings.flow_spread > 0.0;
-        let wanted = if is_early { 1 } else { BATCH.min((settings.terminals - self.terminals) as usize) };
-        self.plans.resize_with(wanted.max(self.plans.len()), Plan::default);
-        for _ in 0..wanted {
-            let Some(place) = self.vacancy.draw(&space.domain, 0.0, rng) else { break };
-            let apart = self.vacancy.threshold();
-            if self.plans[..self.planned].iter().all(|plan| plan.place.distance(place) >= apart) {
-                self.plans[self.planned].place = place;
-                self.planned += 1;
+        self.prepare(space, settings, rng);
+        self.places.drain(..self.batch);
+        if self.places.is_empty() {
+            self.draw(&space.domain, settings, rng);
+        }
+        self.batch = self.places.len();
+        self.planned = self.batch;
+        self.plans.resize_with(self.planned.max(self.plans.len()), Plan::default);
+        for (plan, &place) in self.plans.iter_mut().zip(self.places.iter().rev()) {
+            plan.place = place;
+        }
+        space.index.coarsen(self.vacancy.threshold());
+        let (mut plans, mut help, trees) = (take(&mut self.plans), take(&mut self.help), take(&mut self.trees));
+        let space = &*space;
+        let rank = |_: usize, plan: &mut Plan| {
+            plan.rank(space, &trees, [0, settings.candidates as usize], settings.tolerance.into());
+        };
+        help.for_each(&mut plans[..self.planned], rank, || self.draw(&space.domain, settings, rng));
+        (self.plans, self.help, self.trees) = (plans, help, trees);
+        self.planned > 0
+    }
+
+    /// Draws places for the terminals after those that are there or planned: as far from each other as from all that
+    /// are there. There may be fewer than are wanted, or none.
+    fn draw(&mut self, domain: &Domain, settings: &CcoSettings, rng: &mut VesselRng) {
+        let there = self.terminals + self.places.len() as u32;
+        // Flows that differ are decided one by one.
+        let most = if settings.flow_spread > 0.0 { 1 } else { (there / BATCH_SHARE).clamp(1, MOST_IN_BATCH) };
+        for _ in 0..most.min(settings.terminals.saturating_sub(there)) {
+            let Some(place) = self.vacancy.draw(domain, 0.0, rng) else { break };
+            if self.vacancy.are_apart(domain, place, &self.places) {
+                self.places.push(place);
             }
         }
-        self.prepare(space, settings, rng);
-        space.index.coarsen(self.vacancy.threshold());
-        let (space, trees) = (&*space, &self.trees);
-        parallel::for_each(&mut self.plans[..self.planned], |_, plan| {
-            plan.rank(space, trees, [0, settings.candidates as usize], settings.tolerance.into());
-        });
-        self.planned > 0
     }
 
     /// Makes room around the segment that was in the way of the last terminal, unless that was in vain lately.

@@ -11,12 +11,19 @@ use super::{
     sums::{Below, Sums},
 };
 use crate::synthesis::{
-    random::Stream,
+    parallel::Help,
+    random::{Stream, VesselRng},
     tissue::{Ball, Disc, Tissue},
 };
 use bevy_math::{DVec3, Vec3};
 use rand::RngExt;
 use std::sync::Arc;
+
+/// Polishes one node.
+fn polish(space: &mut Space, rng: &mut VesselRng) {
+    let node = rng.random_range(0..space.forest.nodes.len() as u32);
+    space.polish(node..node + 1, 1e-4, &mut Help::default());
+}
 
 fn space(tissue: Arc<dyn Tissue>, gamma: f64, unit: f64) -> Space {
     let domain = Domain::new(tissue).expect("a domain");
@@ -119,7 +126,7 @@ fn sums_and_strains_stay_exact_through_changes_and_undoing() {
             }
         }
         if round % 3 == 0 {
-            space.polish(rng.random_range(0..space.forest.nodes.len() as u32), 1e-4);
+            polish(&mut space, &mut rng);
         }
         let anew = sums_anew(&space);
         for node in (0..space.forest.nodes.len() as u32).filter(|&node| space.forest.node(node).parent != NONE) {
@@ -153,7 +160,7 @@ fn bounds_of_no_two_segments_reach_into_each_other() {
             if let (Attempt::Failed, Some(blocked)) = (attempt, space.blocked.take()) {
                 space.relieve(blocked);
             }
-            space.polish(rng.random_range(0..space.forest.nodes.len() as u32), 1e-4);
+            polish(&mut space, &mut rng);
             let segments = (0..space.forest.nodes.len() as u32).filter(|&node| space.forest.node(node).parent != NONE);
             let cone = |node: u32| {
                 let own = space.forest.node(node);

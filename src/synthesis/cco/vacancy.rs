@@ -10,7 +10,7 @@
 //! so that their number is in proportion to ρ.
 
 use super::{cell_map::CellMap, domain::Domain, dwindling::DwindlingList};
-use crate::synthesis::{parallel, random::VesselRng};
+use crate::synthesis::{parallel::Help, random::VesselRng};
 use bevy_math::{DVec3, Vec3};
 use rand::RngExt;
 
@@ -32,7 +32,7 @@ const LEAST_SHARE: f64 = 0.3;
 /// Terminals for which memory is taken in advance: there may be no room for as many as are asked for.
 const MOST_RESERVED: usize = 1 << 20;
 /// Cells that a thread looks at in a row.
-const BLOCK: u64 = 4096;
+const BLOCK: u64 = 2048;
 /// Blocks that are looked at together.
 const BLOCKS: u64 = 64;
 
@@ -53,6 +53,7 @@ pub(super) struct Vacancy {
     failed: u32,
     /// Whether terminals are equally dense everywhere.
     is_uniform: bool,
+    help: Help,
 }
 
 impl Vacancy {
@@ -69,6 +70,7 @@ impl Vacancy {
             terminals: Vec::new(),
             failed: 0,
             is_uniform: domain.is_uniform(),
+            help: Help::default(),
         };
         if !vacancy.is_uniform {
             let scale = size_of_share(domain, vacancy.mean_density(domain).recip()) / size_of_share(domain, 1.0);
@@ -104,22 +106,23 @@ impl Vacancy {
             let cell = self.cell(domain, self.terminals[number].as_dvec3());
             self.taken.get_or_insert(cell as u32, number as u32);
         }
-        let mut vacant = std::mem::take(&mut self.vacant);
+        let (mut vacant, mut help) = (std::mem::take(&mut self.vacant), std::mem::take(&mut self.help));
         vacant.clear();
         let blocks = self.cells().div_ceil(BLOCK).min(BLOCKS);
         let mut found = vec![Vec::new(); blocks as usize];
         let mut first = 0;
         while first < self.cells() {
-            parallel::for_each(&mut found, |block, found: &mut Vec<u32>| {
+            let look = |block: usize, found: &mut Vec<u32>| {
                 let start = first + block as u64 * BLOCK;
                 let cells = start..(start + BLOCK).min(self.cells());
                 found.clear();
                 found.extend(cells.filter(|&cell| self.is_vacant(domain, cell)).map(|cell| cell as u32));
-            });
+            };
+            help.for_each(&mut found, look, || ());
             found.iter().flatten().for_each(|&cell| vacant.push(cell));
             first += blocks * BLOCK;
         }
-        self.vacant = vacant;
+        (self.vacant, self.help) = (vacant, help);
     }
 
     /// Whether there may be room in a cell.
@@ -148,6 +151,12 @@ impl Vacancy {
         let density = domain.density(point);
         let apart = if density > 0.0 { size_of(domain, density.recip()) } else { f64::INFINITY };
         (apart <= MOST_APART).then_some(apart * self.threshold)
+    }
+
+    /// Whether a place with terminals keeps its distance from others.
+    pub(super) fn are_apart(&self, domain: &Domain, place: DVec3, others: &[DVec3]) -> bool {
+        let reach = self.reach(domain, place).unwrap_or(f64::INFINITY);
+        others.iter().all(|other| other.distance(place) >= reach)
     }
 
     /// Whether terminals have a density above 0 at the centre or a corner of a cell.

@@ -87,3 +87,29 @@ fn pulls_are_the_derivatives_by_the_lengths() {
         assert!((numeric - exact).abs() < 1e-6 * (1.0 + exact.abs()), "{numeric} {exact}");
     }
 }
+
+#[test]
+fn a_search_looks_at_a_bounded_number_of_places_whatever_the_numbers_are() {
+    let mut rng = Stream::Statistics.rng(12);
+    let (mut most, mut sum) = (0, 0);
+    for case in 0..3000 {
+        let mut any = |decades: f64| 10.0f64.powf(rng.random_range(-decades..decades));
+        let exponent = Exponent::new([3.0, 2.0, 4.0][case % 3]);
+        let (size, load) = (any(8.0), any(30.0));
+        let below = Below { load, power: exponent.raise(load, load.sqrt()), span: any(20.0) };
+        let flows = [any(15.0), any(15.0)];
+        let mut slope = Slope::ROOT;
+        (slope.load, slope.volume) = (any(20.0), any(20.0));
+        // Long and thin triangles, too.
+        let flat = if case % 2 == 0 { 1.0 } else { any(6.0) };
+        let mut point = || size * DVec3::new(rng.random(), flat * rng.random::<f64>(), rng.random());
+        let ends = [point(), point(), point()];
+        let joint = Joint { ends, flows, below: [below, Below::default()], exponent };
+        let start = joint.start();
+        let (place, looks) = joint.descend(start, &joint.sums(start), &slope, [1e-12, 1e-4][case % 2]);
+        assert!(place.is_finite(), "case {case}");
+        (most, sum) = (most.max(looks), sum + looks);
+    }
+    assert!(most < MOST_LOOKS + 2 * HALVINGS, "{most} places");
+    assert!(sum < 3000 * MOST_LOOKS / 4, "{sum} places in all");
+}
