@@ -2,9 +2,11 @@
 
 mod demand;
 mod dense;
+mod full_matrix;
 mod incremental;
 mod joined;
 mod laws;
+mod tight;
 mod trees;
 mod wounded;
 

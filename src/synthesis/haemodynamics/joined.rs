@@ -4,22 +4,20 @@
 //! Out: both networks solved, so that the flow from an artery into a link arrives in the vein. Terminals without a link
 //! drain into the bed's pool, as in a single network.
 //!
-//! The links make loops, so no pair of sweeps solves both trees at once, but each alone is solved exactly. With T the
-//! matrix of a tree whose links end in a given pressure, and E that of the links between them, the arterial pressures
-//! satisfy (Tₐ − E·Tᵥ⁻¹·Eᵀ)·p = b. The matrix is symmetric and positive, and conjugate gradients preconditioned by Tₐ⁻¹
-//! need one pair of sweeps of each tree in a pass: not of all its nodes, but only of those with links and open ends and
-//! of the forks between them, since all others have been eliminated once. The error falls by the factor (1 − √(1 −
-//! c))/(1 + √(1 − c)) or better, where c < 1 is the largest share of a change of pressure that comes back through the
-//! links from the other side. A bed with high resistance takes few passes, one with low resistance many. With two trees
-//! of 100,000 segments and 3,000 links, it takes 12 passes if about half of the pressure drops in the bed, 34 for a
-//! sixth of it, 81 for a thirtieth. Reaching the limit of passes is an error. Starting from the last solution, it takes
-//! no pass if nothing has changed. A piece that only links connect could have any pressure; a leak of 10⁻¹¹ of each
-//! link into the pool gives it the pool's. Newton's method around this solves for open ends, as in a single tree.
+//! The links make loops, so no pair of sweeps solves both trees at once, but each alone is solved exactly. That is what
+//! conjugate gradients need (`gradients.rs`): few passes where the bed resists, as that of an organ does. They begin at
+//! the last solution, so there is no pass if nothing has changed. The less the bed resists, the more passes it takes,
+//! and the less its flow is known from pressures on both sides that hardly differ. Then all joints of both trees are
+//! eliminated instead (`whole.rs`): more work, but with an exact result for any resistances. A piece that only links
+//! connect could have any pressure; a leak of 10⁻¹¹ of each link into the pool gives it the pool's. Newton's method
+//! around this solves for open ends, as in a single tree.
 
 use super::{
     FlowError, Network,
+    gradients::{Gradients, Target},
     open_ends::OpenEnds,
     side::{LEAST_PRESSURE, Side},
+    whole::Whole,
 };
 use crate::synthesis::{
     pace::{Pace, at_once},
@@ -36,23 +34,28 @@ pub struct Circulation {
     conductance: f64,
     passes: usize,
     sides: [Side; 2],
+    whole: Whole,
+    /// Least share of a change of pressure in the arteries that doesn't come back from the veins; `None` if the links tie
+    /// the trees too closely for conjugate gradients.
+    loose_share: Option<f64>,
 }
 
 impl Circulation {
-    /// Passes of the conjugate gradients after which they count as failed; ten to eighty are usual. Without rounding they
-    /// need no more passes than there are linked nodes, and so many are needed if the bed resists far less than vessels.
-    const MOST_PASSES: usize = 500;
-    /// Passes more, for each linked node.
-    const MOST_PASSES_PER_NODE: usize = 4;
-    /// Imbalance of a linked node, relative to the largest flow in a link, and correction of its pressure, relative to
-    /// the largest, at which the conjugate gradients end.
+    /// Share of a change of pressure that must not come back from the veins for conjugate gradients: one that needs as
+    /// many passes as an elimination of all joints is worth.
+    const LEAST_SHARE: f64 = 1e-5;
+    /// Accuracy of the conjugate gradients.
     const ACCURACY: f64 = 1e-12;
     /// The same in the first round for the open ends, whose flow is still a guess.
     const FIRST_ACCURACY: f64 = 1e-4;
-    /// Rounding of a pressure, relative to the largest.
-    const ROUNDING: f64 = 1e-14;
+    /// Error of a pressure found by conjugate gradients, relative to the largest.
+    const GRADIENT_ERROR: f64 = 1e-11;
+    /// Share of a flow through an open end that this error may be.
+    const BLUR: f64 = 1e-6;
+    /// Pressure without effect, in Pa, however small the others are.
+    const NOTHING: f64 = Self::GRADIENT_ERROR * LEAST_PRESSURE;
     /// Passes of Newton's method for the open ends after which it counts as failed; some five are usual.
-    const MOST_ROUNDS: usize = 60;
+    const MOST_ROUNDS: usize = 200;
     /// Passes after which it is damped.
     const UNDAMPED: usize = 20;
 
@@ -76,11 +79,19 @@ impl Circulation {
         links: &[BedLink],
         pace: &Pace,
     ) -> Result<Self, FlowError> {
-        let resistance = arterial.settings.bed.resistance.ok_or(FlowError::BedWithoutResistance)?;
-        venous.settings.bed.resistance = Some(resistance);
+        let conductance = arterial.settings.bed.conductance().ok_or(FlowError::BedWithoutResistance)?;
+        venous.settings.bed.resistance = arterial.settings.bed.resistance;
         venous.set_beds(&pace.part(0.0..0.3)).await;
-        let conductance = 1.0 / resistance.pascal_seconds_per_cubic_metre();
-        let mut circulation = Self { arterial, venous, links: 0, conductance, passes: 0, sides: Default::default() };
+        let mut circulation = Self {
+            arterial,
+            venous,
+            links: 0,
+            conductance,
+            passes: 0,
+            sides: Default::default(),
+            whole: Whole::default(),
+            loose_share: None,
+        };
         circulation.set_links_paced(links, &pace.part(0.3..1.0)).await?;
         Ok(circulation)
     }
@@ -113,11 +124,11 @@ impl Circulation {
 
     /// Replaces it, and solves.
     pub(super) fn set_bed_resistance(&mut self, resistance: Resistance) -> Result<(), FlowError> {
-        self.conductance = 1.0 / resistance.pascal_seconds_per_cubic_metre();
         for network in [&mut self.arterial, &mut self.venous] {
             network.settings.bed.resistance = Some(resistance);
             at_once(network.set_beds(&Pace::default()));
         }
+        self.conductance = self.arterial.settings.bed.conductance().ok_or(FlowError::BedWithoutResistance)?;
         self.solve()
     }
 
@@ -178,27 +189,31 @@ impl Circulation {
     pub async fn solve_paced(&mut self, pace: &Pace) -> Result<(), FlowError> {
         self.share_bed_pressure();
         self.passes = 0;
-        let has_ends = [&self.arterial, &self.venous].iter().any(|network| !network.ends.all().is_empty());
-        self.sides[0].prepare(&mut self.arterial, &pace.part(0.0..0.2)).await;
-        self.sides[1].prepare(&mut self.venous, &pace.part(0.2..0.4)).await;
+        let has_changed = [
+            self.sides[0].prepare(&mut self.arterial, &pace.part(0.0..0.2)).await,
+            self.sides[1].prepare(&mut self.venous, &pace.part(0.2..0.4)).await,
+        ];
+        if has_changed != [false; 2] {
+            let share = self.gradients().loose_share(Self::LEAST_SHARE);
+            self.loose_share = (share >= Self::LEAST_SHARE).then_some(share);
+        }
         let (balancing, driving) = (pace.part(0.4..0.7), pace.part(0.7..1.0));
-        let mut residual = f64::INFINITY;
-        let mut accuracy = if has_ends { Self::FIRST_ACCURACY } else { Self::ACCURACY };
+        if self.networks().iter().all(|network| network.ends.all().is_empty()) {
+            self.balance(Self::ACCURACY, &balancing).await;
+            self.drive(&driving).await;
+            return Ok(());
+        }
+        self.start_ends();
+        let (mut residual, mut accuracy) = (f64::INFINITY, Self::FIRST_ACCURACY);
         for round in 0..Self::MOST_ROUNDS {
-            for network in [&mut self.arterial, &mut self.venous] {
-                network.linearise_ends();
-            }
-            self.balance(accuracy, &balancing).await?;
-            if !has_ends {
-                self.drive(&driving).await;
+            self.arterial.ends.linearise();
+            self.venous.ends.linearise();
+            self.balance(accuracy, &balancing).await;
+            let is_exact = self.loose_share.is_none() || accuracy == Self::ACCURACY;
+            residual = self.accept_ends(round >= Self::UNDAMPED);
+            if residual <= 1.0 && is_exact {
+                self.finish(&driving).await;
                 return Ok(());
-            }
-            let damped = round >= Self::UNDAMPED;
-            let [arteries, veins] = &self.sides;
-            residual = self.arterial.accept_ends(&arteries.quotient, damped);
-            residual = residual.max(self.venous.accept_ends(&veins.quotient, damped));
-            if residual <= 1.0 && accuracy == Self::ACCURACY {
-                return self.finish(&driving).await;
             }
             // Newton's method squares the error, so a round needs no more accuracy than that. Ends with very little
             // flow need more.
@@ -210,6 +225,10 @@ impl Circulation {
         Err(FlowError::NotConverged { what, passes: Self::MOST_ROUNDS, residual })
     }
 
+    fn networks(&self) -> [&Network; 2] {
+        [&self.arterial, &self.venous]
+    }
+
     /// Makes pressures of both relative to the same pool.
     fn share_bed_pressure(&mut self) {
         let moved = self.venous.bed - self.arterial.bed;
@@ -217,29 +236,62 @@ impl Circulation {
         self.venous.bed = self.arterial.bed;
     }
 
+    /// First guess of the flows through open ends: the last ones, but no more than the highest pressure of all drives.
+    fn start_ends(&mut self) {
+        let highest = self.arterial.source.max(self.venous.source).max(0.0);
+        for network in [&mut self.arterial, &mut self.venous] {
+            let ambient = network.ambient();
+            network.ends.start_below(highest - ambient);
+        }
+    }
+
+    /// Takes the flows through open ends from the pressures. Returns the largest change, in units of the tolerance.
+    fn accept_ends(&mut self, damped: bool) -> f64 {
+        let mut residual = 0.0;
+        let is_tight = self.loose_share.is_none();
+        for (network, side) in [&mut self.arterial, &mut self.venous].into_iter().zip(&self.sides) {
+            let largest = network.source.abs().max(network.ambient().abs()).max(LEAST_PRESSURE);
+            let rounding = if is_tight { Self::NOTHING } else { Self::GRADIENT_ERROR * largest };
+            residual = f64::max(residual, network.ends.accept(|end| side.from_outside(end), rounding, damped));
+            if network.ends.is_blurred(rounding, Self::BLUR) {
+                self.loose_share = None;
+            }
+        }
+        residual
+    }
+
     /// Replaces the ends' tangents by their draw, and solves once more.
-    async fn finish(&mut self, pace: &Pace) -> Result<(), FlowError> {
-        let [arteries, veins] = &self.sides;
-        self.arterial.finish_ends(&arteries.quotient);
-        self.venous.finish_ends(&veins.quotient);
-        self.balance(Self::ACCURACY, &pace.part(0.0..0.0)).await?;
+    async fn finish(&mut self, pace: &Pace) {
+        for (network, side) in [&mut self.arterial, &mut self.venous].into_iter().zip(&self.sides) {
+            let ambient = network.ambient() + network.bed;
+            network.ends.finish(|end| side.from_outside(end), ambient);
+        }
+        self.balance(Self::ACCURACY, &pace.part(0.0..0.0)).await;
+        for network in [&mut self.arterial, &mut self.venous] {
+            let ambient = network.ambient();
+            network.ends.count_from(-ambient);
+        }
         self.drive(pace).await;
-        Ok(())
     }
 
     /// Finds the pressures at links and open ends, with linearised ends.
-    async fn balance(&mut self, accuracy: f64, pace: &Pace) -> Result<(), FlowError> {
-        self.sides[0].quotient.eliminate(&self.arterial.ends);
-        self.sides[1].quotient.eliminate(&self.venous.ends);
-        let (mut pressures, residual, tolerated) = self.begin_from_last(accuracy);
-        self.passes += self.descend(&mut pressures, residual, &tolerated, pace).await?;
-        let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
-        let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
-        veins.carry(arteries, *conductance, &pressures, &mut into_veins);
-        veins.settle(venous, &into_veins);
-        arteries.carry(veins, *conductance, &veins.pressures, &mut into_arteries);
-        arteries.settle(arterial, &into_arteries);
-        Ok(())
+    async fn balance(&mut self, accuracy: f64, pace: &Pace) {
+        if let Some(share) = self.loose_share {
+            match self.gradients().balance(Target { accuracy, share }, pace).await {
+                Some(passes) => {
+                    self.passes += passes;
+                    return;
+                }
+                None => self.loose_share = None,
+            }
+        }
+        let Self { arterial, venous, sides, conductance, .. } = self;
+        self.whole.balance([arterial, venous], sides, *conductance, pace).await;
+    }
+
+    fn gradients(&mut self) -> Gradients<'_> {
+        let Self { arterial, venous, sides, conductance, .. } = self;
+        Gradients { networks: [arterial, venous], sides, conductance: *conductance }
     }
 
     /// Solves both whole networks from the pressures at the links.
@@ -253,99 +305,4 @@ impl Circulation {
         arteries.carry(veins, *conductance, &pressures, &mut into_arteries);
         arteries.drive(arterial, &into_arteries, &pace.part(0.5..1.0)).await;
     }
-
-    /// Solves each tree once from the last solution. Returns the arterial pressures at the links, the remaining
-    /// imbalance there, and its tolerance.
-    fn begin_from_last(&mut self, accuracy: f64) -> (Vec<f64>, Vec<f64>, Tolerated) {
-        let Self { arterial, venous, sides: [arteries, veins], conductance, .. } = self;
-        let (mut into_arteries, mut into_veins) = (vec![0.0; arteries.slots.len()], vec![0.0; veins.slots.len()]);
-        let before = veins.pressures.clone();
-        arteries.carry(veins, *conductance, &before, &mut into_arteries);
-        arteries.settle(arterial, &into_arteries);
-        let pressures = arteries.pressures.clone();
-        veins.carry(arteries, *conductance, &pressures, &mut into_veins);
-        veins.settle(venous, &into_veins);
-        let change: Vec<f64> = veins.pressures.iter().zip(&before).map(|(a, b)| a - b).collect();
-        let mut residual = into_arteries;
-        arteries.carry(veins, *conductance, &change, &mut residual);
-        arteries.excuse_roots(arterial, &mut residual);
-        let tolerated = self.tolerated(accuracy, &pressures, &self.sides[1].pressures);
-        (pressures, residual, tolerated)
-    }
-
-    /// Conjugate gradients on the arterial pressures at the links. Returns the number of passes.
-    async fn descend(
-        &mut self,
-        pressures: &mut [f64],
-        mut residual: Vec<f64>,
-        tolerated: &Tolerated,
-        pace: &Pace,
-    ) -> Result<usize, FlowError> {
-        let Self { arterial, sides: [arteries, veins], conductance, .. } = self;
-        let (mut z, mut carried) = (vec![0.0; residual.len()], vec![0.0; residual.len()]);
-        let (mut into_veins, mut answer) = (vec![0.0; veins.slots.len()], vec![0.0; veins.slots.len()]);
-        arteries.respond(&residual, &mut z);
-        // `image` is the arteries' matrix times `direction`.
-        let (mut direction, mut image) = (z.clone(), residual.clone());
-        let mut product = dot(&residual, &z);
-        let most = Self::MOST_PASSES + Self::MOST_PASSES_PER_NODE * residual.len();
-        let mut passes = 0;
-        while largest(&residual) > tolerated.flow || largest(&z) > tolerated.pressure {
-            pace.rest(0.0).await;
-            veins.carry(arteries, *conductance, &direction, &mut into_veins);
-            veins.respond(&into_veins, &mut answer);
-            arteries.carry(veins, *conductance, &answer, &mut carried);
-            arteries.excuse_roots(arterial, &mut carried);
-            let curvature: f64 = direction.iter().zip(image.iter().zip(&carried)).map(|(d, (i, c))| d * (i - c)).sum();
-            if passes == most || !(curvature > 0.0) {
-                let residual = tolerated.accuracy * largest(&residual) / tolerated.flow;
-                return Err(FlowError::NotConverged { what: "the flow through the bed", passes, residual });
-            }
-            passes += 1;
-            let step = product / curvature;
-            for at in 0..pressures.len() {
-                pressures[at] += step * direction[at];
-                residual[at] -= step * (image[at] - carried[at]);
-            }
-            arteries.respond(&residual, &mut z);
-            let next = dot(&residual, &z);
-            let turn = next / product;
-            product = next;
-            for at in 0..pressures.len() {
-                direction[at] = z[at] + turn * direction[at];
-                image[at] = residual[at] + turn * image[at];
-            }
-        }
-        Ok(passes)
-    }
-
-    /// The tolerance: an imbalance relative to the largest flow in a link, and a correction relative to the pressures,
-    /// but at least the effect of rounding of the pressures, and of a pressure that is as good as none.
-    fn tolerated(&self, accuracy: f64, arterial: &[f64], venous: &[f64]) -> Tolerated {
-        let [arteries, veins] = &self.sides;
-        let links = arteries.of_links.iter().zip(&veins.of_links);
-        let flows = links.map(|(&a, &v)| self.conductance * (arterial[a as usize] - venous[v as usize]).abs());
-        let pressure = largest(arterial).max(largest(venous)).max(self.arterial.source.abs()).max(LEAST_PRESSURE);
-        let rounding = Self::ROUNDING * self.conductance * pressure;
-        let least = self.conductance * LEAST_PRESSURE;
-        Tolerated { accuracy, flow: accuracy * flows.fold(least, f64::max) + rounding, pressure: accuracy * pressure }
-    }
-}
-
-/// Tolerance of the conjugate gradients.
-struct Tolerated {
-    /// Relative.
-    accuracy: f64,
-    /// In m³/s.
-    flow: f64,
-    /// In Pa.
-    pressure: f64,
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |largest, value| largest.max(value.abs()))
 }

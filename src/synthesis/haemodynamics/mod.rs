@@ -40,10 +40,12 @@
 pub mod bleeding;
 pub mod blood_volume;
 mod circuit;
+mod closeness;
 pub mod clotting;
 mod demand;
 mod error;
 mod gaps;
+mod gradients;
 mod interruption;
 pub mod ischaemia;
 mod joined;
@@ -56,8 +58,10 @@ mod settings;
 mod side;
 mod skeleton;
 mod solution;
+mod star_mesh;
 mod sweeps;
 mod viscosity;
+mod whole;
 
 pub use bleeding::{Bleeding, BleedingChange, BleedingEnd, BleedingSettings, EndState};
 pub use blood_volume::{BloodVolume, BloodVolumeSettings};

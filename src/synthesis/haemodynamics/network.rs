@@ -13,10 +13,6 @@ use crate::synthesis::units::Pressure;
 /// enough that 1 + HELD is HELD in `f64`: it acts like infinity, without a case of its own.
 const HELD: f64 = (1u64 << 60) as f64;
 
-/// Leak from a link into the bed's pool, in conductances of the link. It fixes the pressure of pieces that only links
-/// connect, and is below the accuracy of every flow.
-const LEAK: f64 = 1e-11;
-
 /// Least length of a segment, in its radii, which keeps the conductance of a segment of zero length finite.
 const LEAST_LENGTH: f64 = 1e-6;
 
@@ -211,13 +207,11 @@ impl Network {
     pub(super) fn set_bed(&mut self, node: usize) {
         let link = self.circuit.links[node + FIRST];
         let is_terminal = link.first_child == REFERENCE && link.parent != SOURCE;
-        let links = self.link_counts.get(node).copied().unwrap_or(0);
-        let y = match self.settings.bed.resistance {
-            Some(resistance) if links > 0 => {
-                f64::from(links) * (1.0 + LEAK) / resistance.pascal_seconds_per_cubic_metre()
-            }
+        let links = self.link_counts.get(node).copied().map_or(0.0, f64::from);
+        let y = match self.settings.bed.conductance() {
+            Some(conductance) if links > 0.0 => links * conductance,
             _ if !is_terminal => 0.0,
-            Some(resistance) => 1.0 / resistance.pascal_seconds_per_cubic_metre(),
+            Some(conductance) => conductance,
             None => HELD / self.whole_resistance(node),
         };
         self.circuit.beds[node + FIRST] = Shunt { y, s: 0.0 };

@@ -242,8 +242,9 @@ impl OpenEnds {
             residual = self.pass(source, ambient, pass >= Self::UNDAMPED);
             if residual <= 1.0 {
                 let skeleton = std::mem::take(&mut self.skeleton);
-                self.finish(|end| skeleton.pressure(end.joint), ambient, bed);
+                self.finish(|end| skeleton.pressure(end.joint), ambient + bed);
                 self.skeleton = skeleton;
+                self.count_from(-ambient);
                 return Ok(());
             }
         }
@@ -275,6 +276,18 @@ impl OpenEnds {
         let residual = self.accept(|end| skeleton.pressure(end.joint), 0.0, damped);
         self.skeleton = skeleton;
         residual
+    }
+
+    /// Lowers all flows to what flows if each end alone has a pressure before it that none can exceed.
+    pub fn start_below(&mut self, pressure: f64) {
+        for end in &mut self.list {
+            end.flow = end.flow.min(end.driven(pressure));
+        }
+    }
+
+    /// Whether a flow is known no better than to its `share`, if pressures are exact to `rounding`.
+    pub fn is_blurred(&self, rounding: f64, share: f64) -> bool {
+        self.list.iter().any(|end| rounding * end.stump.y > share * end.flow)
     }
 
     /// Sets every end's draw to the tangent of its law at its flow, for pressures relative to that outside.
@@ -313,25 +326,28 @@ impl OpenEnds {
             if !(change <= tolerated) {
                 residual = if change.is_nan() { f64::INFINITY } else { residual.max(change / tolerated) };
             }
-            end.flow = if damped { 0.5 * (new + end.flow) } else { new };
+            // Flows may cycle through orders of magnitude.
+            end.flow = match damped && new > 0.0 && end.flow > 0.0 {
+                true => (new * end.flow).sqrt(),
+                false => new,
+            };
         }
         residual
     }
 
-    /// Sets pressures, and the ends' draw as conductances to the outside, for pressures relative to the bed's. The
-    /// pressures of the solution are relative to that outside.
-    pub fn finish(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, ambient: f64, bed: f64) {
+    /// Sets pressures, and the ends' draw as conductances to the outside. The pressures of the solution are relative to
+    /// that outside, which is `ambient`.
+    pub fn finish(&mut self, pressure: impl Fn(&NetworkEnd) -> f64, ambient: f64) {
         for end in &mut self.list {
             let difference = pressure(end);
             let is_open = end.flow > 0.0 && difference > 0.0;
             end.stump = Shunt::default();
             if is_open {
-                let y = end.flow / difference;
-                end.stump = Shunt { y, s: y * ambient };
+                end.stump.y = end.flow / difference;
             } else {
                 end.flow = 0.0;
             }
-            end.pressure = ambient + difference - end.piece * end.flow + bed;
+            end.pressure = ambient + difference - end.piece * end.flow;
         }
     }
 

@@ -3,7 +3,11 @@
 //! In: a [`Network`], the slots with links, and the draw of open ends. Out: pressures at those slots for any currents
 //! into them, at the cost of the joints alone: at most two for each link or end, however large the tree.
 
-use super::{Network, open_ends::OpenEnds, skeleton::Skeleton};
+use super::{
+    Network,
+    open_ends::OpenEnds,
+    skeleton::{Joint, Skeleton},
+};
 use crate::synthesis::pace::Pace;
 
 /// A joint after eliminating all joints below it.
@@ -36,19 +40,28 @@ impl Quotient {
         self.skeleton.trace(&network.circuit, linked.iter().copied().chain(ends), &pace.part(0.5..1.0)).await;
     }
 
+    /// All joints, below before above.
+    pub fn joints(&self) -> &[Joint] {
+        self.skeleton.joints()
+    }
+
     /// The joint of a slot with a link or an attached end.
     pub fn joint_at(&self, slot: u32) -> u32 {
         self.skeleton.joint_at(slot)
     }
 
-    /// Eliminates the joints from the tips to the roots, with the draw of open ends.
-    pub fn eliminate(&mut self, ends: &OpenEnds) {
+    /// Eliminates the joints from the tips to the roots, with the draw of open ends and leaks from joints into the bed's
+    /// pool.
+    pub fn eliminate(&mut self, ends: &OpenEnds, leaks: impl Iterator<Item = (u32, f64)>) {
         let joints = self.skeleton.joints();
         let (source, nothing) = (joints.len() as u32, joints.len() as u32 + 1);
         self.sums.clear();
         self.sums.extend(joints.iter().map(|joint| joint.hanging.y));
         for end in ends.all() {
             self.sums[self.skeleton.joint_at(end.attached) as usize] += end.stump.y;
+        }
+        for (joint, leak) in leaks {
+            self.sums[joint as usize] += leak;
         }
         self.nodes.clear();
         for (at, joint) in joints.iter().enumerate() {

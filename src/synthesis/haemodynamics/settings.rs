@@ -123,6 +123,14 @@ pub struct BedSettings {
 impl BedSettings {
     /// Default of the bed's pressure, in mmHg: the textbook has 35 to 10 along a capillary.
     pub const DEFAULT_PRESSURE: f64 = 22.5;
+    /// Largest conductance of a bed, in m³/(s·Pa). Its products with the resistance of any vessel are finite.
+    const OPEN: f64 = 1e100;
+
+    /// Conductance of a terminal's or a link's bed, in m³/(s·Pa), if it resists.
+    pub(super) fn conductance(&self) -> Option<f64> {
+        let conductance = |resistance: Resistance| 1.0 / resistance.pascal_seconds_per_cubic_metre();
+        self.resistance.map(|resistance| conductance(resistance).clamp(1.0 / Self::OPEN, Self::OPEN))
+    }
 
     fn validate(&self) -> Result<(), FlowError> {
         FlowError::check_finite("the bed's pressure in mmHg", self.pressure.mmhg())?;

@@ -1,15 +1,21 @@
 //! One of the two networks of a circulation, reduced to its linked nodes.
 
 use super::{
-    Network,
-    circuit::{SOURCE, node_slot},
+    Network, NetworkEnd,
+    circuit::{FIRST, SOURCE, node_slot},
+    open_ends::OpenEnds,
     quotient::Quotient,
+    skeleton::Joint,
 };
 use crate::synthesis::{pace::Pace, tree::NodeId};
 
 /// A pressure as good as none, in Pa: a hundred-thousandth of a mmHg. A patient without blood has no more, and then
 /// nothing is large enough to measure an error by.
 pub(super) const LEAST_PRESSURE: f64 = 1e-3;
+
+/// Leak from the links of a node into the bed's pool, in conductances of the links or the node's segment, whichever
+/// conducts less. It fixes the pressure of pieces that only links connect, and is below the accuracy of every flow.
+const LEAK: f64 = 1e-11;
 
 /// The linked nodes of one network, and its response to currents into them.
 #[derive(Clone, Debug, Default)]
@@ -23,8 +29,10 @@ pub(super) struct Side {
     joints: Vec<u32>,
     /// The revision of the network that was traced.
     traced: Option<u64>,
-    /// Pressures of the slots as of the last solution.
+    /// Pressures of the slots as of the last solution, relative to the bed's.
     pub pressures: Vec<f64>,
+    /// Pressures of all joints, relative to that outside.
+    from_outside: Vec<f64>,
 }
 
 impl Side {
@@ -37,15 +45,58 @@ impl Side {
         Self { slots, of_links, ..Self::default() }
     }
 
-    /// Traces the network if it has changed, and takes the pressures of its last solution.
-    pub async fn prepare(&mut self, network: &mut Network, pace: &Pace) {
-        if self.traced != Some(network.revision) {
+    /// Traces the network if it has changed, and takes the pressures of its last solution. Returns whether it has.
+    pub async fn prepare(&mut self, network: &mut Network, pace: &Pace) -> bool {
+        let has_changed = self.traced != Some(network.revision);
+        if has_changed {
             self.quotient.trace(network, &self.slots, pace).await;
             self.joints = self.slots.iter().map(|&slot| self.quotient.joint_at(slot)).collect();
             self.traced = Some(network.revision);
         }
         self.pressures.clear();
         self.pressures.extend(self.slots.iter().map(|&slot| network.circuit.slots[slot as usize].pressure));
+        has_changed
+    }
+
+    /// All joints, below before above.
+    pub fn joints(&self) -> &[Joint] {
+        self.quotient.joints()
+    }
+
+    /// The joint of a slot with a link or an attached end.
+    pub fn joint_at(&self, slot: u32) -> u32 {
+        self.quotient.joint_at(slot)
+    }
+
+    /// The linked slots with their joints.
+    pub fn linked(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.slots.iter().copied().zip(self.joints.iter().copied())
+    }
+
+    /// The joint of every link.
+    pub fn linked_joints(&self) -> impl Iterator<Item = u32> + '_ {
+        self.of_links.iter().map(|&at| self.joints[at as usize])
+    }
+
+    /// Takes a solution: pressures of all joints above `zero`. That and `ambient` are relative to the bed's.
+    pub fn take(&mut self, pressures: impl Iterator<Item = f64>, zero: f64, ambient: f64) {
+        self.from_outside.clear();
+        self.from_outside.extend(pressures);
+        for (taken, &joint) in self.pressures.iter_mut().zip(&self.joints) {
+            *taken = self.from_outside[joint as usize] + zero;
+        }
+        self.from_outside.iter_mut().for_each(|pressure| *pressure -= ambient - zero);
+    }
+
+    /// Pressure at an open end's node, relative to that outside.
+    pub fn from_outside(&self, end: &NetworkEnd) -> f64 {
+        self.from_outside[self.joint_at(end.attached) as usize]
+    }
+
+    /// Eliminates all joints, with links that end in a given pressure and linearised ends.
+    pub fn eliminate(&mut self, network: &Network, ends: &OpenEnds) {
+        let leaks = self.slots.iter().zip(&self.joints).map(|(&slot, &joint)| (joint, leak(network, slot)));
+        self.quotient.eliminate(ends, leaks);
     }
 
     /// Pressures at the linked nodes caused by currents into them, with everything else at pressure 0: T⁻¹.
@@ -63,13 +114,13 @@ impl Side {
     pub fn settle(&mut self, network: &Network, currents: &[f64]) {
         self.quotient.begin();
         self.give(currents);
+        let ambient = network.ambient();
         for end in network.ends.all() {
-            self.quotient.give(self.quotient.joint_at(end.attached), end.stump.s);
+            self.quotient.give(self.quotient.joint_at(end.attached), end.stump.counted_from(-ambient).s);
         }
         self.quotient.solve(network.source);
-        for (pressure, &joint) in self.pressures.iter_mut().zip(&self.joints) {
-            *pressure = self.quotient.pressure(joint);
-        }
+        let pressures: Vec<f64> = (0..self.joints().len()).map(|joint| self.quotient.pressure(joint as u32)).collect();
+        self.take(pressures.into_iter(), 0.0, ambient);
     }
 
     fn give(&mut self, currents: &[f64]) {
@@ -110,6 +161,12 @@ impl Side {
     }
 }
 
+/// Conductance between a linked slot and the bed's pool.
+pub(super) fn leak(network: &Network, slot: u32) -> f64 {
+    let segment = 1.0 / network.whole_resistance(slot as usize - FIRST);
+    LEAK * segment.min(network.circuit.beds[slot as usize].y)
+}
+
 impl Network {
     /// Replaces the nodes that are joined to another network: each is joined as often as it is named. All must exist.
     pub(super) async fn set_links(&mut self, nodes: impl Iterator<Item = NodeId>, pace: &Pace) {
@@ -127,23 +184,5 @@ impl Network {
         self.sums_stale = true;
         self.revision += 1;
         self.ends.is_untraced = true;
-    }
-
-    /// Sets the ends' draw by their tangents, for pressures relative to the bed's.
-    pub(super) fn linearise_ends(&mut self) {
-        self.ends.linearise();
-        self.ends.count_from(-self.ambient());
-    }
-
-    pub(super) fn accept_ends(&mut self, quotient: &Quotient, damped: bool) -> f64 {
-        let ambient = self.ambient();
-        self.ends.count_from(ambient);
-        let rounding = 1e-11 * self.source.abs().max(ambient.abs()).max(LEAST_PRESSURE);
-        self.ends.accept(|end| quotient.pressure(quotient.joint_at(end.attached)) - ambient, rounding, damped)
-    }
-
-    pub(super) fn finish_ends(&mut self, quotient: &Quotient) {
-        let ambient = self.ambient();
-        self.ends.finish(|end| quotient.pressure(quotient.joint_at(end.attached)) - ambient, ambient, self.bed);
     }
 }

@@ -20,6 +20,8 @@ pub(super) struct Joint {
     pub is_root: bool,
     /// Bed, links and whole subtrees at the joint.
     pub hanging: Shunt,
+    /// The subtrees alone.
+    pub subtrees: Shunt,
     /// The run of segments to the joint above.
     pub run: Run,
     /// `hanging`, the open ends and the joints below, in the solution.
@@ -144,7 +146,8 @@ impl Skeleton {
         let mut joint = Joint {
             above: NONE,
             is_root: upper == SOURCE,
-            hanging: self.hanging(circuit, slot),
+            hanging: self.hanging(circuit, slot, circuit.beds[slot as usize]),
+            subtrees: self.hanging(circuit, slot, Shunt::default()),
             run: Run::default(),
             below: Shunt::default(),
             pressure: 0.0,
@@ -154,7 +157,8 @@ impl Skeleton {
         }
         joint.run.through = 1.0 / circuit.slots[slot as usize].resistance;
         while self.joint_of[upper as usize] == NONE {
-            joint.run.extend(self.hanging(circuit, upper), circuit.slots[upper as usize].resistance);
+            let hanging = self.hanging(circuit, upper, circuit.beds[upper as usize]);
+            joint.run.extend(hanging, circuit.slots[upper as usize].resistance);
             upper = circuit.links[upper as usize].upstream;
         }
         joint.above = upper;
@@ -163,9 +167,9 @@ impl Skeleton {
         joint
     }
 
-    /// Bed, links and the children off the paths.
-    fn hanging(&self, circuit: &Circuit, slot: u32) -> Shunt {
-        let mut hanging = circuit.beds[slot as usize];
+    /// A bed and the children off the paths.
+    fn hanging(&self, circuit: &Circuit, slot: u32, bed: Shunt) -> Shunt {
+        let mut hanging = bed;
         let mut child = circuit.links[slot as usize].first_child;
         while child != REFERENCE {
             let link = circuit.links[child as usize];

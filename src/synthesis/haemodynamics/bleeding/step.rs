@@ -6,6 +6,10 @@ use crate::synthesis::{
     units::{Flow, Pressure, Volume},
 };
 
+/// Most parts into which a part of a step is divided because much of the blood flows: several times as many as take all
+/// of it.
+const MOST_SHORTER_PARTS: u32 = 256;
+
 /// What bleeds as a whole.
 trait Wounded {
     /// Flow of all open ends in the last part of a step, in m³/s.
@@ -22,11 +26,16 @@ trait Wounded {
     fn bleed(&mut self, parts: u32, seconds: f64, blood: &mut BloodVolume) -> Result<(), FlowError> {
         for _ in 0..parts {
             let mut left = seconds / f64::from(parts);
+            let mut shorter_parts = 0;
             loop {
                 let mut part = left;
                 let mut rate = self.solve(part, self.rate(), blood)?;
                 if let Some(shorter) = blood.shorter(rate, part) {
-                    part = shorter;
+                    // So many let all the blood flow: what is left of the time is without pressure.
+                    if shorter_parts < MOST_SHORTER_PARTS {
+                        part = shorter;
+                    }
+                    shorter_parts += 1;
                     rate = self.solve(part, rate, blood)?;
                 }
                 self.collect(part, blood.share_there(rate, part), blood);
