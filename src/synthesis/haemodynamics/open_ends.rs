@@ -118,6 +118,13 @@ impl NetworkEnd {
         self.orifice / (self.opening * self.opening)
     }
 
+    /// The next flow of Newton's method. One so much less than the last that it is lost in rounding lies below this share
+    /// of the last.
+    fn less_than_told(&self, next: f64) -> f64 {
+        let least = 1e-9 * self.flow;
+        if next.abs() < least { least } else { next.max(0.0) }
+    }
+
     /// The flow through piece and hole at a difference of pressure: Δ = R·Q + K·Q².
     fn driven(&self, difference: f64) -> f64 {
         if !(difference > 0.0 && self.opening > 0.0) {
@@ -319,18 +326,17 @@ impl OpenEnds {
         let mut residual = 0.0_f64;
         for end in &mut self.list {
             let pressure = pressure(end);
-            let new =
-                if end.flow > 0.0 { (end.stump.y * pressure - end.stump.s).max(0.0) } else { end.driven(pressure) };
+            let new = match end.flow > 0.0 {
+                true => end.less_than_told(end.stump.y * pressure - end.stump.s),
+                false => end.driven(pressure),
+            };
             let tolerated = Self::ACCURACY * new + Self::NEGLIGIBLE * largest.max(new) + rounding * end.stump.y;
             let change = (new - end.flow).abs();
             if !(change <= tolerated) {
                 residual = if change.is_nan() { f64::INFINITY } else { residual.max(change / tolerated) };
             }
-            // Flows may cycle through orders of magnitude.
-            end.flow = match damped && new > 0.0 && end.flow > 0.0 {
-                true => (new * end.flow).sqrt(),
-                false => new,
-            };
+            // Only a flow that rises can pass the solution.
+            end.flow = if damped && new > end.flow { 0.5 * (new + end.flow) } else { new };
         }
         residual
     }
