@@ -118,9 +118,8 @@ impl NetworkEnd {
         self.orifice / (self.opening * self.opening)
     }
 
-    /// The next flow of Newton's method. One so much less than the last that it is lost in rounding lies below this share
-    /// of the last.
-    fn less_than_told(&self, next: f64) -> f64 {
+    /// The next flow from that of the tangent. One that rounding loses beside the last falls only to a share of it.
+    fn next_flow(&self, next: f64) -> f64 {
         let least = 1e-9 * self.flow;
         if next.abs() < least { least } else { next.max(0.0) }
     }
@@ -327,7 +326,7 @@ impl OpenEnds {
         for end in &mut self.list {
             let pressure = pressure(end);
             let new = match end.flow > 0.0 {
-                true => end.less_than_told(end.stump.y * pressure - end.stump.s),
+                true => end.next_flow(end.stump.y * pressure - end.stump.s),
                 false => end.driven(pressure),
             };
             let tolerated = Self::ACCURACY * new + Self::NEGLIGIBLE * largest.max(new) + rounding * end.stump.y;
