@@ -16,12 +16,15 @@ use bevy::{
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
-use bevy_vessels::synthesis::{
-    organ::{Eye, EyeSettings},
-    recipe::conjunctiva,
-    texture::{Bake, BakeSettings, BakedMap, Canvas, Layer, MapKind, TexelFormat},
-    tissue::MeshSurface,
-    tree::{VesselKind, VesselTree},
+use bevy_vessels::{
+    VesselPlugin,
+    synthesis::{
+        organ::{Eye, EyeSettings},
+        recipe::conjunctiva,
+        texture::{Bake, BakeSettings, BakedMap, Canvas, Layer, MapKind, TexelFormat},
+        tissue::MeshSurface,
+        tree::{VesselKind, VesselTree},
+    },
 };
 use clap::Parser;
 use common::{
@@ -49,6 +52,7 @@ fn main() -> AppExit {
     let studio = args.studio.clone();
     App::new()
         .add_plugins(StudioPlugin { args: studio, title: "Conjunctiva", help: "N  next seed", more_help: "" })
+        .add_plugins(VesselPlugin::default())
         .insert_resource(args)
         .add_systems(Startup, begin)
         .add_systems(
@@ -142,18 +146,18 @@ fn show(
     };
     if let Some(mut materials) = materials {
         for (name, mesh, material) in [
-            ("sclera", eye.globe.clone().into(), sclera),
-            ("iris", eye.iris.clone().into(), iris),
-            ("cornea", eye.cornea.clone().into(), cornea),
+            ("sclera", eye.globe.clone(), sclera),
+            ("iris", eye.iris.clone(), iris),
+            ("cornea", eye.cornea.clone(), cornea),
         ] {
-            let drawn = (Mesh3d(meshes.add(mesh)), MeshMaterial3d(materials.add(material)), place);
+            let drawn = (Mesh3d(meshes.add(Mesh::from(mesh))), MeshMaterial3d(materials.add(material)), place);
             let mut part = commands.spawn((Part, Name::new(name), drawn));
             if name == "cornea" {
                 part.insert(NotShadowCaster);
             }
         }
     }
-    let shot = |file, view| Shot { file, view: moved(view, &place), field_of_view: 34.0, endoscope: false };
+    let shot = |file, view| Shot { file, view: moved(view, &place), field_of_view: 44.0, endoscope: false };
     shots.0 = vec![
         shot("conjunctiva.png", &eye.three_quarter),
         shot("conjunctiva_front.png", &eye.front),

@@ -18,6 +18,7 @@ use bevy_vessels::{
     synthesis::{
         mesh::ShadedMesh,
         organ::{ColonSettings, EyeSettings, KidneySettings, LiverSettings, RootSites, Viewpoint},
+        tissue::NoGoRegion,
     },
 };
 use clap::Parser;
@@ -76,10 +77,13 @@ fn spawn_organs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets
         let liver = LiverSettings { seed, ..default() }.generate()?;
         let kidney = KidneySettings { seed, ..default() }.generate()?;
         let eye = EyeSettings { seed, ..default() }.generate()?;
+        // The pupil and what lies before it have no vessels.
+        let pupil = NoGoRegion::Ball { center: eye.limbus.0, radius: 1.05 * eye.limbus.1 };
+        let iris = eye.iris;
         let organs = [
             ("colon", colon.mesh, colon.roots, colon.front, PresetName::Colon, 2.5),
-            ("liver", liver.mesh, liver.roots, liver.front, PresetName::Paper, 3.0),
-            ("kidney", kidney.mesh, kidney.roots, kidney.front, PresetName::Paper, 3.0),
+            ("liver", liver.mesh, liver.roots, liver.front, PresetName::Paper, 4.5),
+            ("kidney", kidney.mesh, kidney.roots, kidney.front, PresetName::Paper, 4.5),
             ("eye", eye.globe, eye.roots, eye.front, PresetName::Conjunctiva, 2.0),
         ];
         for (column, (name, mesh, roots, view, preset, radii)) in (0..).zip(organs) {
@@ -88,9 +92,15 @@ fn spawn_organs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets
             let vessels = vessels.with_roots(entries(&roots));
             let mut organ = assets.spawn(&mut commands, mesh.into(), Color::WHITE, place);
             organ.insert((Name::new(format!("{name}_{seed}")), vessels));
+            if name == "eye" {
+                let mut paint = OrganPaint::default();
+                paint.no_go.regions.push(pupil.clone());
+                organ.insert(paint);
+                assets.spawn(&mut commands, iris.clone().into(), Color::WHITE, place);
+            }
         }
     }
-    let view = Viewpoint { eye: Vec3::new(0.0, 0.0, 6.2), target: Vec3::ZERO, up: Vec3::Y };
+    let view = Viewpoint { eye: Vec3::new(0.0, 0.0, 5.9), target: Vec3::ZERO, up: Vec3::Y };
     shots.0 = vec![Shot { file: "organ_variation.png", view, field_of_view: 42.0, endoscope: false }];
     Ok(())
 }
@@ -100,7 +110,7 @@ fn entries(roots: &RootSites) -> RootPlacements {
     RootPlacements {
         artery: RootPlacement::Nearest(roots.arterial.clone()),
         vein: RootPlacement::Nearest(roots.venous.clone()),
-        ..RootPlacements::from(roots)
+        ..RootPlacements::default()
     }
 }
 
