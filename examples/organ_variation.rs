@@ -94,7 +94,7 @@ fn spawn_organs(mut commands: Commands, args: Res<Args>, mut assets: OrganAssets
             organ.insert((Name::new(format!("{name}_{seed}")), vessels));
             if name == "eye" {
                 let mut paint = OrganPaint::default();
-                paint.no_go.regions.push(pupil.clone());
+                paint.no_go.regions.push(pupil);
                 organ.insert(paint);
                 assets.spawn(&mut commands, iris.clone().into(), Color::WHITE, place);
             }

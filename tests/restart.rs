@@ -126,15 +126,15 @@ fn optimisation_starts_again_without_asking_either() {
     };
     let root = |growth: &Cco| growth.tree(VesselKind::Artery).positions()[0];
     let tissue = Counting::new(None);
-    let mut growth = Cco::new(tissue.clone(), settings.clone(), &roots(0.3), 1).expect("a growth");
+    let mut growth = Cco::new(tissue.clone(), settings.clone(), &roots(0.8), 1).expect("a growth");
     assert!(tissue.asked() > FEW);
     let first = root(&growth);
-    growth.restart(settings.clone(), &roots(0.3), 2).expect("a growth");
+    growth.restart(settings.clone(), &roots(0.8), 2).expect("a growth");
     assert!(tissue.asked() < FEW);
     assert_ne!(root(&growth), first);
     // A tissue that keeps what is derived serves another growth, too.
     let tissue = Counting::new(Some(Derived::default()));
-    let start = |seed| Cco::new(tissue.clone(), settings.clone(), &roots(0.3), seed).expect("a growth");
+    let start = |seed| Cco::new(tissue.clone(), settings.clone(), &roots(0.8), seed).expect("a growth");
     assert_eq!(root(&start(1)), first);
     assert!(tissue.asked() > FEW);
     assert_ne!(root(&start(2)), first);
