@@ -9,19 +9,17 @@
 mod common;
 
 use bevy::{
-    asset::RenderAssetUsages,
-    image::{ImageFilterMode, ImageSampler, ImageSamplerDescriptor},
     light::NotShadowCaster,
     prelude::*,
-    render::render_resource::{Extent3d, TextureDimension, TextureFormat},
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 use bevy_vessels::{
     VesselPlugin,
+    plugin::texture_image,
     synthesis::{
         organ::{Eye, EyeSettings},
         recipe::conjunctiva,
-        texture::{Bake, BakeSettings, BakedMap, Canvas, Layer, MapKind, TexelFormat},
+        texture::{Bake, BakeSettings, Canvas, Layer, MapKind},
         tissue::MeshSurface,
         tree::{VesselKind, VesselTree},
     },
@@ -128,7 +126,7 @@ fn show(
     };
     parts.iter().for_each(|part| commands.entity(part).despawn());
     let place = to_unit_size(eye.globe.bounds());
-    let mut texture = |kind| bake.map(kind).map(|map| images.add(image(map)));
+    let mut texture = |kind| bake.map(kind).map(|map| images.add(texture_image(map.clone(), bake.report.repeats)));
     let sclera = StandardMaterial {
         base_color_texture: texture(MapKind::Albedo),
         normal_map_texture: texture(MapKind::Normal),
@@ -164,25 +162,4 @@ fn show(
         shot("conjunctiva_side.png", &eye.lateral),
     ];
     status.0 = format!("seed {}, {} texels near vessels", args.seed, bake.report.texels);
-}
-
-/// A map as an image of Bevy, with all its levels.
-fn image(map: &BakedMap) -> Image {
-    let format = match map.kind.format() {
-        TexelFormat::Rgba8Srgb => TextureFormat::Rgba8UnormSrgb,
-        _ => TextureFormat::Rgba8Unorm,
-    };
-    let size = Extent3d { width: map.size, height: map.size, depth_or_array_layers: 1 };
-    let mut image = Image::new_uninit(size, TextureDimension::D2, format, RenderAssetUsages::RENDER_WORLD);
-    image.texture_descriptor.mip_level_count = u32::try_from(map.levels.len()).unwrap_or(1);
-    image.data = Some(map.levels.concat());
-    let linear = ImageFilterMode::Linear;
-    image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
-        mag_filter: linear,
-        min_filter: linear,
-        mipmap_filter: linear,
-        anisotropy_clamp: 16,
-        ..default()
-    });
-    image
 }

@@ -6,6 +6,8 @@
 //! Keys as on the screen. `--headless --out DIR` writes `discs.png` and `liver.png`.
 
 mod common;
+#[path = "common/stouter.rs"]
+mod stouter;
 
 use bevy::{math::ops, prelude::*};
 use bevy_panorbit_camera::PanOrbitCamera;
@@ -23,6 +25,7 @@ use common::{
     photo::{Shot, Shots},
     studio::{StudioArgs, StudioPlugin, View, moved, to_unit_size},
 };
+use stouter::stouter;
 
 /// The presets side by side.
 #[derive(Parser, Resource, Clone)]
@@ -61,14 +64,6 @@ fn main() -> AppExit {
         .add_systems(Update, see_everything.run_if(resource_equals(View::Window)))
         .add_systems(PostUpdate, place_captions.after(TransformSystems::Propagate))
         .run()
-}
-
-/// Vessels with their radii multiplied, so that they are visible from afar.
-fn stouter(mut wish: Vasculature, radii: f32) -> Vasculature {
-    let settings = wish.generator.colonization_mut().expect("presets colonize");
-    settings.arterial.terminal_radius *= radii;
-    settings.venous.terminal_radius *= radii;
-    wish
 }
 
 /// A line of text below a place in the world.

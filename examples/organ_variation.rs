@@ -11,6 +11,8 @@
 //! `--headless` draws to a file instead, which is also the behaviour without a display.
 
 mod common;
+#[path = "common/stouter.rs"]
+mod stouter;
 
 use bevy::prelude::*;
 use bevy_vessels::{
@@ -27,6 +29,7 @@ use common::{
     photo::{Shot, Shots},
     studio::{StudioArgs, StudioPlugin, View, moved, to_unit_size, transform_of},
 };
+use stouter::stouter;
 
 /// Organs along each side of the picture.
 const ACROSS: u64 = 4;
@@ -112,15 +115,6 @@ fn entries(roots: &RootSites) -> RootPlacements {
         vein: RootPlacement::Nearest(roots.venous.clone()),
         ..RootPlacements::default()
     }
-}
-
-/// Vessels with their radii multiplied, so that they are visible from afar.
-fn stouter(mut vessels: Vasculature, radii: f32) -> Vasculature {
-    if let Some(settings) = vessels.generator.colonization_mut() {
-        settings.arterial.terminal_radius *= radii;
-        settings.venous.terminal_radius *= radii;
-    }
-    vessels
 }
 
 /// The transform that makes an organ one unit large, shows its front, and puts it in its cell.

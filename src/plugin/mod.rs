@@ -64,7 +64,7 @@ pub use surgery::{
 };
 pub use texture::{
     TextureBase, TextureFailed, TexturePlugin, TextureReady, TextureShown, VesselMaps, VesselTexture,
-    VesselTextureError,
+    VesselTextureError, texture_image,
 };
 pub use vessels::{
     ChangeCursor, ChangeLog, Changes, OrganVessels, SegmentColoring, VesselAppearance, VesselIndex, VesselPicker,

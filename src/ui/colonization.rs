@@ -1,6 +1,9 @@
 //! The settings of space colonization, in the groups of the paper's section 3.
 
-use super::knob::{Field, Knob, Rows, Unit};
+use super::{
+    knob::{Field, Knob, Rows, Unit},
+    widgets::choose_variant,
+};
 use crate::synthesis::{
     colonization::{AngleSpread, ColonizationSettings, SettingsWarning, SystemSettings},
     tissue::TissueGrowth,
@@ -284,17 +287,12 @@ fn growth_row(ui: &mut Ui, system: &mut SystemSettings) {
             TissueGrowth::Linear(rate) | TissueGrowth::Exponential(rate) => *rate,
             _ => TissueGrowth::DEFAULT_LINEAR,
         };
-        let is =
-            |law: &TissueGrowth, other: &TissueGrowth| std::mem::discriminant(law) == std::mem::discriminant(other);
-        for (name, choice) in [
+        let choices = [
             ("none", TissueGrowth::None),
             ("linear", TissueGrowth::Linear(rate)),
             ("exponential", TissueGrowth::Exponential(rate)),
-        ] {
-            if ui.selectable_label(is(law, &choice), name).clicked() {
-                *law = choice;
-            }
-        }
+        ];
+        choose_variant(ui, law, choices);
         if let TissueGrowth::Linear(rate) | TissueGrowth::Exponential(rate) = law {
             ui.add(egui::DragValue::new(rate).speed(0.0005).range(0.0..=0.2).max_decimals(4)).on_hover_text("a step");
         }

@@ -1,6 +1,6 @@
 //! The generator of an organ's vessels, with its settings.
 
-use super::{colonization, knob::Rows, optimisation};
+use super::{colonization, knob::Rows, optimisation, widgets::show_error};
 use crate::{
     plugin::Vasculature,
     synthesis::{
@@ -8,7 +8,7 @@ use crate::{
         roots::RootPlacement,
     },
 };
-use bevy_egui::egui::{Color32, Ui};
+use bevy_egui::egui::Ui;
 
 /// Shows the choice of a generator, its settings, and what is wrong with them. `base` has the values to go back to.
 pub(super) fn show(ui: &mut Ui, wish: &mut Vasculature, base: &Preset, rows: &mut Rows, linked: &mut bool) {
@@ -28,7 +28,7 @@ pub(super) fn show(ui: &mut Ui, wish: &mut Vasculature, base: &Preset, rows: &mu
         }
     }
     if let Err(error) = wish.generator.validate() {
-        ui.colored_label(Color32::from_rgb(230, 90, 80), error.to_string());
+        show_error(ui, error);
     }
 }
 

@@ -1,8 +1,9 @@
 //! Progress of the growth, and what steers it.
 
+use super::widgets::show_error;
 use crate::plugin::{GrowthAction, GrowthControl, GrowthPhase, GrowthProgress};
 use crate::synthesis::tree::VesselKind;
-use bevy_egui::egui::{Color32, ProgressBar, Ui};
+use bevy_egui::egui::{ProgressBar, Ui};
 
 /// Shows the buttons that steer a growth, and returns what was asked for.
 pub(super) fn show_buttons(ui: &mut Ui, control: GrowthControl) -> Option<GrowthAction> {
@@ -39,7 +40,7 @@ pub(super) fn show_progress(ui: &mut Ui, progress: &GrowthProgress, error: Optio
     };
     ui.add(ProgressBar::new(share).text(text));
     if let Some(error) = error {
-        ui.colored_label(Color32::from_rgb(230, 90, 80), error);
+        show_error(ui, error);
     }
     let kinds = VesselKind::ALL.into_iter().filter(|&kind| progress.nodes[kind] > 0);
     let counts: Vec<String> =

@@ -31,6 +31,7 @@ mod sketch;
 mod state;
 mod statistics;
 mod surgery;
+mod widgets;
 
 pub use focus::PanelFocus;
 pub use state::{PanelTool, VesselPanel};

@@ -1,12 +1,15 @@
 //! The organ that the panel shows: its name, its seed, its tissue and where vessels enter.
 
+use super::widgets::{choose_variant, is_same_variant};
 use crate::synthesis::{
+    random::VesselRng,
     roots::{RootPlacement, RootPlacements, Roots},
     tissue::{TissueMode, TissueSource},
     tree::VesselKind,
 };
-use bevy::{ecs::entity::Entity, math::Vec3};
+use bevy::ecs::entity::Entity;
 use bevy_egui::egui::{ComboBox, DragValue, Grid, Ui};
+use rand::{RngExt, SeedableRng};
 
 /// Steps on the surface with which a growth in stages begins.
 const SURFACE_STEPS: u32 = 40;
@@ -41,11 +44,7 @@ pub(super) fn show_seed(ui: &mut Ui, seed: &mut u64) {
 
 /// A seed of at most six digits, which can be told and typed.
 fn rolled(seed: u64, time: f64) -> u64 {
-    // A step of the SplitMix64 generator.
-    let mut mixed = (seed ^ time.to_bits()).wrapping_add(0x9e37_79b9_7f4a_7c15);
-    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (mixed ^ (mixed >> 31)) % 1_000_000
+    VesselRng::seed_from_u64(seed ^ time.to_bits()).random_range(0..1_000_000)
 }
 
 /// Shows where on a mesh vessels grow.
@@ -54,17 +53,13 @@ pub(super) fn show_tissue(ui: &mut Ui, tissue: &mut TissueSource) {
     ui.horizontal_wrapped(|ui| {
         ui.label("where").on_hover_text("On the organ's surface, on its lining, or through its inside.");
         let staged = TissueMode::Staged { surface_steps: SURFACE_STEPS };
-        let is = |mode: TissueMode, other: TissueMode| std::mem::discriminant(&mode) == std::mem::discriminant(&other);
-        for (name, choice) in [
+        let choices = [
             ("surface", TissueMode::Surface),
             ("lining", TissueMode::Lining),
             ("inside", TissueMode::Volume),
             ("surface, then inside", staged),
-        ] {
-            if ui.selectable_label(is(mesh.mode, choice), name).clicked() && !is(mesh.mode, choice) {
-                mesh.mode = choice;
-            }
-        }
+        ];
+        choose_variant(ui, &mut mesh.mode, choices);
         if let TissueMode::Staged { surface_steps } = &mut mesh.mode {
             ui.add(DragValue::new(surface_steps).range(1..=u32::MAX)).on_hover_text("steps on the surface");
         }
@@ -76,19 +71,10 @@ pub(super) fn show_roots(ui: &mut Ui, roots: &mut RootPlacements) {
     Grid::new("roots").num_columns(2).show(ui, |ui| {
         for kind in VesselKind::ALL {
             ui.label(kind.plural());
-            show_placement(ui, kind, placement_mut(roots, kind));
+            show_placement(ui, kind, &mut roots[kind]);
             ui.end_row();
         }
     });
-}
-
-fn placement_mut(roots: &mut RootPlacements, kind: VesselKind) -> &mut RootPlacement {
-    match kind {
-        VesselKind::Artery => &mut roots.artery,
-        VesselKind::Vein => &mut roots.vein,
-        VesselKind::PortalVein => &mut roots.portal_vein,
-        VesselKind::Duct => &mut roots.duct,
-    }
 }
 
 fn show_placement(ui: &mut Ui, kind: VesselKind, placement: &mut RootPlacement) {
@@ -100,17 +86,11 @@ fn show_placement(ui: &mut Ui, kind: VesselKind, placement: &mut RootPlacement) 
             ("at the hilum", RootPlacement::Hilum),
             ("beside", RootPlacement::Beside),
         ];
-        let is = |placement: &RootPlacement, other: &RootPlacement| {
-            std::mem::discriminant(placement) == std::mem::discriminant(other)
-        };
-        let name = choices.iter().find(|(_, choice)| is(placement, choice)).map_or("at points", |(name, _)| name);
-        ComboBox::from_id_salt(("placement", kind.name())).selected_text(name).show_ui(ui, |ui| {
-            for (name, choice) in choices {
-                if ui.selectable_label(is(placement, &choice), name).clicked() && !is(placement, &choice) {
-                    *placement = choice;
-                }
-            }
-        });
+        let name = choices.iter().find(|(_, choice)| is_same_variant(placement, choice));
+        let name = name.map_or("at points", |(name, _)| name);
+        ComboBox::from_id_salt(("placement", kind.name()))
+            .selected_text(name)
+            .show_ui(ui, |ui| choose_variant(ui, placement, choices));
         match placement {
             RootPlacement::Spread(roots) => {
                 ui.add(DragValue::new(roots).speed(0.05).range(1..=Roots::MAX_SPREAD)).on_hover_text("roots");
@@ -119,14 +99,12 @@ fn show_placement(ui: &mut Ui, kind: VesselKind, placement: &mut RootPlacement) 
                 ui.add(DragValue::new(reach).speed(0.005).range(Roots::LEAST_REACH..=f32::MAX).suffix(" d"))
                     .on_hover_text("All tissue is within so many diameters of a root.");
             }
-            RootPlacement::Nearest(points) | RootPlacement::Exact(points) => show_points(ui, points),
+            RootPlacement::Nearest(points) | RootPlacement::Exact(points) => {
+                ui.weak(format!("{} points", points.len()));
+            }
             _ => {}
         }
     });
-}
-
-fn show_points(ui: &mut Ui, points: &[Vec3]) {
-    ui.weak(format!("{} points", points.len()));
 }
 
 #[cfg(test)]

@@ -134,9 +134,7 @@ impl PanelMemory {
             tools.growth.write(GrowthCommand::new(organ.entity, action));
         }
         ui.separator();
-        // A draft, so that only changes are changes.
-        let mut wish = organ.wish.clone();
-        self.show_wish(ui, &mut wish, panel, organ);
+        self.show_wish(ui, panel, organ);
         let mut look = organ.look.clone();
         CollapsingHeader::new("Looks").show(ui, |ui| show_look(ui, &mut look, organ.progress));
         organ.look.set_if_neq(look);
@@ -164,7 +162,10 @@ impl PanelMemory {
     }
 
     /// Shows what makes an organ's vessels, and takes changes over.
-    fn show_wish(&mut self, ui: &mut Ui, wish: &mut Vasculature, panel: &mut VesselPanel, organ: &mut OrganItem) {
+    fn show_wish(&mut self, ui: &mut Ui, panel: &mut VesselPanel, organ: &mut OrganItem) {
+        // A draft, so that only changes are changes.
+        let mut draft = organ.wish.clone();
+        let wish = &mut draft;
         self.history.note(organ.entity, wish, ui.ctx().egui_is_using_pointer());
         let base = self.bases.entry(organ.entity).or_insert_with(|| Base::of(wish));
         preset::show(ui, wish, base, &mut self.preset_file, &mut self.told_of_preset);
@@ -178,7 +179,7 @@ impl PanelMemory {
             organ::show_tissue(ui, &mut wish.tissue);
             organ::show_roots(ui, &mut wish.roots);
         });
-        organ.wish.set_if_neq(wish.clone());
+        organ.wish.set_if_neq(draft);
     }
 }
 

@@ -1,5 +1,6 @@
 //! Figures and plots of an organ's vessels: what the paper measures.
 
+use super::widgets::still_plot;
 use crate::{
     plugin::{
         Vessels,
@@ -12,7 +13,7 @@ use crate::{
 };
 use bevy::{ecs::entity::Entity, platform::collections::HashMap};
 use bevy_egui::egui::{Color32, Grid, Ui};
-use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
+use egui_plot::{Bar, BarChart, Line, PlotPoints};
 
 /// Bars in the histogram of angles.
 const ANGLE_BARS: usize = 18;
@@ -137,18 +138,14 @@ impl Figures {
     }
 }
 
-fn plot<'a>(ui: &mut Ui, title: &'a str, kind: VesselKind) -> Plot<'a> {
-    ui.weak(title);
-    let plot = Plot::new((title, kind.name())).height(90.0).allow_drag(false).allow_zoom(false).allow_scroll(false);
-    plot.show_background(false).set_margin_fraction(bevy_egui::egui::Vec2::new(0.02, 0.1))
-}
-
 fn bars(ui: &mut Ui, title: &str, kind: VesselKind, bars: Vec<Bar>) {
     let chart = BarChart::new(title, bars).color(color(kind));
-    plot(ui, title, kind).show(ui, |plot| plot.bar_chart(chart));
+    ui.weak(title);
+    still_plot((title, kind.name())).show(ui, |plot| plot.bar_chart(chart));
 }
 
 fn line(ui: &mut Ui, title: &str, kind: VesselKind, points: Vec<[f64; 2]>) {
     let line = Line::new(title, PlotPoints::from(points)).color(color(kind));
-    plot(ui, title, kind).show(ui, |plot| plot.line(line));
+    ui.weak(title);
+    still_plot((title, kind.name())).show(ui, |plot| plot.line(line));
 }

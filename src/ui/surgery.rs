@@ -3,6 +3,7 @@
 use super::{
     focus::PanelFocus,
     state::{PanelTool, VesselPanel},
+    widgets::still_plot,
 };
 use crate::{
     plugin::{BloodLoss, CuttableVessels, Patient, StrokeId, VesselPicker, VesselPlace, Vessels},
@@ -10,7 +11,7 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_egui::egui::{Color32, Ui};
-use egui_plot::{Line, Plot, PlotPoints};
+use egui_plot::{Line, PlotPoints};
 
 /// Reach of tools, as a share of the size of the vessels' box.
 const REACH: f32 = 0.02;
@@ -155,6 +156,5 @@ pub(super) fn show(
     }
     let line =
         Line::new("blood lost, ml", PlotPoints::from(curve.points.clone())).color(Color32::from_rgb(200, 60, 60));
-    let plot = Plot::new("blood lost").height(90.0).allow_drag(false).allow_zoom(false).allow_scroll(false);
-    plot.show_background(false).show(ui, |plot| plot.line(line));
+    still_plot("blood lost").show(ui, |plot| plot.line(line));
 }

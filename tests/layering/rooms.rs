@@ -53,19 +53,20 @@ const RENDER: &str = "
 /// Files of `ui`, each with those that it uses.
 const UI: &str = "
  state
+ widgets
  sketch
  history
- growth
- organ
+ growth         widgets
+ organ          widgets
  preset
- statistics
+ statistics     widgets
  products
  focus          state
- surgery        state  focus
+ surgery        state  widgets  focus
  knob           sketch
- colonization   knob
+ colonization   widgets  knob
  optimisation   knob
- generator      sketch  knob  colonization  optimisation
+ generator      widgets  sketch  knob  colonization  optimisation
  panel          state  sketch  history  growth  organ  preset  statistics  products  surgery  knob  generator
 ";
 

@@ -97,10 +97,9 @@ pub(super) async fn bake(source: Source, pace: Pace) -> Result<Baked, VesselText
     let layers: Vec<Layer<'_>> = vessels.iter().map(|(tree, look)| Layer { tree, look: look.clone() }).collect();
     let baked = Bake::new_paced(&canvas, &layers, base.as_ref(), &settings, &pace.part(0.15..0.95)).await?;
     let Bake { maps, report } = baked;
-    let sampler = sampler(report.repeats);
     let mut images = Vec::with_capacity(maps.len());
     for map in maps {
-        images.push((map.kind, image(map, &sampler)));
+        images.push((map.kind, texture_image(map, report.repeats)));
         pace.rest(0.95).await;
     }
     pace.rest(1.0).await;
@@ -137,8 +136,11 @@ fn sampler(repeats: [bool; 2]) -> ImageSampler {
     })
 }
 
-/// A map as a Bevy image. Maps of numbers stay in main memory: not every graphics card has their formats.
-fn image(map: BakedMap, sampler: &ImageSampler) -> Image {
+/// A baked map as a Bevy image, with all its levels. `repeats` tells in which directions its texture repeats, as
+/// [`BakeReport::repeats`] does.
+///
+/// Maps of numbers stay in main memory: not every graphics card has their formats.
+pub fn texture_image(map: BakedMap, repeats: [bool; 2]) -> Image {
     let format = match map.kind.format() {
         TexelFormat::Rgba8Srgb => TextureFormat::Rgba8UnormSrgb,
         TexelFormat::Rgba8Unorm => TextureFormat::Rgba8Unorm,
@@ -152,6 +154,6 @@ fn image(map: BakedMap, sampler: &ImageSampler) -> Image {
     let mut image = Image::new_uninit(size, TextureDimension::D2, format, usage);
     image.texture_descriptor.mip_level_count = levels;
     image.data = Some(map.levels.concat());
-    image.sampler = sampler.clone();
+    image.sampler = sampler(repeats);
     image
 }

@@ -19,6 +19,7 @@ mod messages;
 mod settings;
 mod show;
 
+pub use bake::texture_image;
 pub use maps::VesselMaps;
 pub use messages::{TextureFailed, TextureReady, VesselTextureError};
 pub use settings::{TextureBase, TextureShown, VesselTexture};

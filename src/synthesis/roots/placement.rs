@@ -3,7 +3,7 @@
 use crate::synthesis::organ::RootSites;
 use crate::synthesis::tree::{ByKind, VesselKind, VesselTree};
 use bevy_math::Vec3;
-use std::ops::Index;
+use std::ops::{Index, IndexMut};
 
 /// Placement of the roots of one kind of vessels.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -103,6 +103,17 @@ impl Index<VesselKind> for RootPlacements {
             VesselKind::Vein => &self.vein,
             VesselKind::PortalVein => &self.portal_vein,
             VesselKind::Duct => &self.duct,
+        }
+    }
+}
+
+impl IndexMut<VesselKind> for RootPlacements {
+    fn index_mut(&mut self, kind: VesselKind) -> &mut RootPlacement {
+        match kind {
+            VesselKind::Artery => &mut self.artery,
+            VesselKind::Vein => &mut self.vein,
+            VesselKind::PortalVein => &mut self.portal_vein,
+            VesselKind::Duct => &mut self.duct,
         }
     }
 }
