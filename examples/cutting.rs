@@ -26,8 +26,12 @@ mod common;
 mod figures;
 #[path = "common/film.rs"]
 mod film;
+#[path = "common/film_picture.rs"]
+mod film_picture;
 #[path = "common/instruments.rs"]
 mod instruments;
+#[path = "common/jets.rs"]
+mod jets;
 #[path = "common/operation.rs"]
 mod operation;
 #[path = "common/organ_file.rs"]

@@ -1,28 +1,31 @@
 //! Drops: a small particle emitter on the CPU, which reads the loss of each open end.
 //!
 //! A drop is an entity; all share one mesh and one material, so that they are drawn as instances. They leave an end
-//! with the velocity of its blood, stretched along their path: arteries spurt with the pulse in jets that break up, and
-//! slow blood wells up from the wound. A drop that lands joins the [`Film`]. No blood is added, and only drops that
-//! miss the organ are lost: if drops are scarce, they are larger.
+//! with the velocity of its blood: arteries spurt with the pulse in [jets](super::jets) that break up into drops of
+//! unequal size, and slow blood wells up from the wound. A drop that lands joins the [`Film`]. No blood is added, and
+//! only drops that miss the organ are lost: if drops are scarce, they are larger.
 //!
 //! Particles on the GPU can use the same data: for each [`OpenEnd`] entity the rate is `flow`, the speed `velocity`,
 //! and position and direction are those of its `GlobalTransform`. Write these into the effect's spawner and properties
 //! once a frame.
 
 use super::{
-    film::{Film, show_film},
+    film::Film,
+    film_picture::show_film,
+    jets::{parting, show_jets},
     surface::Surface,
 };
-use bevy::{light::NotShadowCaster, prelude::*};
+use bevy::{camera::Hdr, light::NotShadowCaster, prelude::*};
 use bevy_vessels::{
     plugin::{OpenEnd, Perfusion, VesselSystems},
     synthesis::units::Volume,
 };
 
-/// Radius of a drop as a share of the vessel's, and its limits in metres.
-const DROP_SHARE: f32 = 0.8;
-const SMALLEST: f32 = 0.000_2;
-const LARGEST: f32 = 0.000_4;
+/// Radius of a jet's mean drop, relative to the jet: that of a thread of liquid which breaks up by its surface tension.
+/// Its limits are in metres.
+const DROP_SHARE: f32 = 1.6;
+const SMALLEST: f32 = 0.000_12;
+const LARGEST: f32 = 0.000_45;
 /// Most drops in the air.
 const MOST_DROPS: usize = 5000;
 /// Least speed of a jet, in m/s.
@@ -31,32 +34,33 @@ const JET: f64 = 0.35;
 const FLOOR: f32 = -0.75;
 /// Seconds in which a drop clears the rim of its own wound.
 const CLEAR: f32 = 0.02;
-/// Seconds in which a jet breaks up into drops, and the largest distance between connected drops until then, in metres.
-const BREAKS_UP: f32 = 0.05;
-const APART: f32 = 0.005;
 /// Exposure of the eye or a camera, in seconds: fast drops are streaks.
-const EXPOSURE: f32 = 0.001;
+const EXPOSURE: f32 = 0.000_7;
 
 /// Open ends drip, drops fall, blood runs over the organ.
 pub struct BloodPlugin;
 
 impl Plugin for BloodPlugin {
     fn build(&self, app: &mut App) {
-        let systems = (lay_film.run_if(resource_added::<Surface>), bleed, fall, run, show_film);
-        app.add_systems(Update, systems.chain().after(VesselSystems::Publish));
+        let systems = (lay_film.run_if(resource_added::<Surface>), bleed, fall, run, show_film, show_jets);
+        app.add_systems(Startup, mix_blood)
+            .add_systems(Update, (systems.chain().after(VesselSystems::Publish), filter_light));
     }
 }
 
 /// A drop on its way.
 #[derive(Component)]
-struct Drop {
+pub struct Drop {
     velocity: Vec3,
     volume: Volume,
     /// Radius of the final ball, in world units.
     radius: f32,
-    /// Half of the distance to the next drop of the jet, in world units.
-    drawn_out: f32,
-    age: f32,
+    /// Seconds since it left.
+    pub age: f32,
+    /// The end that it spurted from, and its number among the drops of that end.
+    pub jet: Option<(Entity, u32)>,
+    /// Radius of the jet, in world units.
+    pub thread: f32,
 }
 
 /// Loss of an end that is not a drop yet, and the number of its drops.
@@ -66,11 +70,34 @@ struct Dripping {
     drops: u32,
 }
 
-/// The mesh and material of drops.
-#[derive(Clone)]
-struct Look {
+/// The mesh of drops, and the material of blood that is thick.
+#[derive(Resource, Clone)]
+pub struct Look {
     mesh: Handle<Mesh>,
-    material: Handle<StandardMaterial>,
+    pub material: Handle<StandardMaterial>,
+}
+
+fn mix_blood(
+    mut commands: Commands,
+    mut meshes: ResMut<Assets<Mesh>>,
+    materials: Option<ResMut<Assets<StandardMaterial>>>,
+) {
+    let Some(mut materials) = materials else { return };
+    let blood = StandardMaterial {
+        base_color: Color::linear_rgb(0.11, 0.003, 0.004),
+        perceptual_roughness: 0.14,
+        reflectance: 0.42,
+        ..default()
+    };
+    let mesh = meshes.add(Sphere::new(1.0).mesh().uv(12, 8));
+    commands.insert_resource(Look { mesh, material: materials.add(blood) });
+}
+
+/// Cameras keep the light of the scene until the film has filtered it.
+fn filter_light(mut commands: Commands, cameras: Query<Entity, (With<Camera3d>, Without<Hdr>)>) {
+    cameras.iter().for_each(|camera| {
+        commands.entity(camera).insert(Hdr);
+    });
 }
 
 /// Metres of a world unit, so that drops have true speed and size relative to the organ.
@@ -110,19 +137,9 @@ fn bleed(
     mut ends: Query<(Entity, &OpenEnd, &GlobalTransform, Option<&mut Dripping>)>,
     drops: Query<(), With<Drop>>,
     blood: (Option<Res<Surface>>, Option<ResMut<Film>>),
-    assets: (ResMut<Assets<Mesh>>, Option<ResMut<Assets<StandardMaterial>>>),
-    mut look: Local<Option<Look>>,
+    look: Option<Res<Look>>,
 ) {
-    let ((Some(surface), Some(mut film)), (mut meshes, Some(mut materials))) = (blood, assets) else { return };
-    let look = look.get_or_insert_with(|| Look {
-        mesh: meshes.add(Sphere::new(1.0).mesh().uv(10, 7)),
-        material: materials.add(StandardMaterial {
-            base_color: Color::linear_rgb(0.15, 0.002, 0.004),
-            perceptual_roughness: 0.3,
-            reflectance: 0.15,
-            ..default()
-        }),
-    });
+    let ((Some(surface), Some(mut film)), Some(look)) = (blood, look) else { return };
     let (unit, mut room) = (metres(&organs), MOST_DROPS.saturating_sub(drops.iter().count()));
     for (entity, end, place, dripping) in &mut ends {
         let Some(mut dripping) = dripping else {
@@ -136,27 +153,34 @@ fn bleed(
             dripping.lost = end.lost;
             continue;
         }
-        let width = DROP_SHARE * end.radius * place.scale().max_element() * unit;
-        let drop = ball(width.clamp(SMALLEST, LARGEST));
-        let wanted = (pending.ml() / drop.ml()) as usize;
+        let thread = (end.flow.cubic_metres_per_second() / (std::f64::consts::PI * end.velocity)).sqrt() as f32;
+        let mean = ball((DROP_SHARE * thread).clamp(SMALLEST, LARGEST));
+        let wanted = (pending.ml() / mean.ml()) as usize;
         let count = wanted.min(room);
         room -= count;
-        let volume = Volume::from_ml(drop.ml() * wanted as f64 / count.max(1) as f64);
+        let mean = Volume::from_ml(mean.ml() * wanted as f64 / count.max(1) as f64);
         let normal = surface.at_rest().triangle_normal(near.triangle);
+        // They leave one after the other, throughout the frame.
+        let interval = time.delta_secs() / count as f32;
         for number in 0..count {
             dripping.drops += 1;
+            let volume = Volume::from_ml(mean.ml() * unequal(dripping.drops));
             dripping.lost = Volume::from_ml(dripping.lost.ml() + volume.ml());
             let velocity = leave(end, place, normal, dripping.drops) / unit;
-            // They leave one after the other, throughout the frame.
-            let interval = time.delta_secs() / count as f32;
-            let age = interval * (number as f32 + scattered(dripping.drops, 7));
-            let drawn_out = 0.5 * (velocity.length() * interval).min(APART / unit);
-            let drop = Drop { velocity, volume, radius: ball_radius(volume) / unit, drawn_out, age };
+            let age = interval * ((count - 1 - number) as f32 + 0.5 + 0.7 * (scattered(dripping.drops, 7) - 0.5));
+            let jet = Some((entity, dripping.drops));
+            let drop = Drop { velocity, volume, radius: ball_radius(volume) / unit, age, jet, thread: thread / unit };
             let pose = drop.pose(place.translation() + velocity * age);
             let look = (Mesh3d(look.mesh.clone()), MeshMaterial3d(look.material.clone()));
             commands.spawn((drop, look, pose, NotShadowCaster));
         }
     }
+}
+
+/// The volume of a drop relative to the mean of all: many are small.
+fn unequal(drop: u32) -> f64 {
+    let share = f64::from(scattered(drop, 11));
+    0.05 + 0.95 * 3.0 * share * share
 }
 
 /// Velocity of a drop at an end, in metres a second: out of the lumen, and up, away from the tissue below. A jet
@@ -165,20 +189,20 @@ fn leave(end: &OpenEnd, place: &GlobalTransform, up: Vec3, drop: u32) -> Vec3 {
     let stray = Vec3::from_array([1, 2, 3].map(|salt| scattered(drop, salt) - 0.5));
     let waver =
         Vec3::from_array([0.043, 0.061, 0.029].map(|pace| ops::sin(pace * drop as f32 + end.place.node.0 as f32)));
-    let direction = (*place.forward() + 0.75 * up + 0.05 * stray + 0.06 * waver).normalize_or(up);
-    direction * end.velocity as f32 * (0.95 + 0.1 * scattered(drop, 5))
+    let direction = (*place.forward() + 0.75 * up + 0.012 * stray + 0.05 * waver).normalize_or(up);
+    direction * end.velocity as f32 * (0.985 + 0.03 * scattered(drop, 5))
 }
 
 impl Drop {
-    /// Stretched along its path, by its speed and while the jet is connected, and thinned to keep its volume.
+    /// Drawn out along its path by the exposure, and thinned to keep its volume. It swells where its jet parts.
     fn pose(&self, at: Vec3) -> Transform {
-        let jet = self.drawn_out * ops::exp(-self.age * self.age / (BREAKS_UP * BREAKS_UP));
-        let half = self.radius + jet.max(0.5 * EXPOSURE * self.velocity.length());
+        let half = self.radius + 0.5 * EXPOSURE * self.velocity.length();
         let width = self.radius * (self.radius / half).sqrt();
+        let swollen = if self.jet.is_some() { parting(self.age) } else { 1.0 };
         let along = Dir3::new(self.velocity).unwrap_or(Dir3::NEG_Y);
         Transform::from_translation(at)
             .looking_to(along, along.any_orthonormal_vector())
-            .with_scale(Vec3::new(width, width, half))
+            .with_scale(Vec3::new(width, width, half) * swollen.max(0.05))
     }
 }
 
@@ -217,15 +241,15 @@ fn run(
     time: Res<Time>,
     blood: (Option<Res<Surface>>, Option<ResMut<Film>>),
     organs: Query<(&Perfusion, &Transform)>,
-    looks: Query<(&Mesh3d, &MeshMaterial3d<StandardMaterial>), With<Drop>>,
+    look: Option<Res<Look>>,
 ) {
     let (Some(surface), Some(mut film)) = blood else { return };
     let unit = metres(&organs);
-    let look = looks.iter().next().map(|(mesh, material)| (mesh.clone(), material.clone()));
     film.flow(time.delta_secs(), |at, normal, volume| {
-        let drop = Drop { velocity: Vec3::ZERO, volume, radius: ball_radius(volume) / unit, drawn_out: 0.0, age: 0.0 };
+        let radius = ball_radius(volume) / unit;
+        let drop = Drop { velocity: Vec3::ZERO, volume, radius, age: 0.0, jet: None, thread: 0.0 };
         let pose = drop.pose(surface.breathed(at) + normal * drop.radius);
         let mut spawned = commands.spawn((drop, pose, NotShadowCaster));
-        look.clone().map(|look| spawned.insert(look));
+        look.as_ref().map(|look| spawned.insert((Mesh3d(look.mesh.clone()), MeshMaterial3d(look.material.clone()))));
     });
 }

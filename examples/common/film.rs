@@ -2,17 +2,10 @@
 //!
 //! The film is a depth on each cell of the [`Skin`]. A thin layer sticks; blood above it runs down the slope as fast as
 //! a thin film does, and its depth spreads it. At the edge it rises before it wets dry cells. None is lost: blood that
-//! hangs from the underside drips off. It is drawn as one mesh over the wet cells, clear where it is thin and dark
-//! where it is deep.
+//! hangs from the underside drips off. Blood that rests clots.
 
 use super::{skin::Skin, surface::Surface};
-use bevy::{
-    asset::RenderAssetUsages,
-    camera::visibility::NoFrustumCulling,
-    light::NotShadowCaster,
-    mesh::{Indices, PrimitiveTopology},
-    prelude::*,
-};
+use bevy::prelude::*;
 use bevy_vessels::synthesis::{mesh::SurfacePoint, units::Volume};
 
 /// Longest step of the flow, in seconds.
@@ -30,41 +23,30 @@ const MOBILITY: f32 = 1060.0 * 9.81 / (3.0 * 0.0035);
 const FASTEST: f32 = 0.09;
 /// Spreading of a film by its depth, relative to its weight: surface tension, and tissue that it wets.
 const SPREAD: f32 = 1.5;
-/// Depths below which the film is clear and above which it is opaque, and the depth at two thirds of the way from the
-/// light to the dark colour, in metres.
-const CLEAR: f32 = 0.000_03;
-const OPAQUE: f32 = 0.000_15;
-const DARK: f32 = 0.0005;
-const LIGHT_COLOR: Vec3 = Vec3::new(0.20, 0.003, 0.005);
-const DARK_COLOR: Vec3 = Vec3::new(0.055, 0.0006, 0.0014);
-/// Height of the film's base above the surface, in world units.
-const LIFT: f32 = 0.0006;
-/// Factor by which the film is drawn deeper, so that its edge catches the light.
-const RELIEF: f32 = 1.6;
-
-/// Rounds of smoothing before the film is drawn: fewer leave jags where a deep pool spills over a ledge.
-const SMOOTHED: u32 = 8;
-
-/// The number of a cell outside the mesh.
-const NONE: u32 = u32::MAX;
+/// Seconds in which two thirds of resting blood clot, and the share of a cell's blood that must pass in a step for the
+/// cell not to rest.
+const CLOTS: f32 = 90.0;
+const RESTS: f32 = 0.002;
 
 /// The film on the organ.
 #[derive(Resource)]
 pub struct Film {
-    skin: Skin,
+    /// The cells.
+    pub skin: Skin,
     /// Metres of a world unit.
-    unit: f32,
-    /// Depth on each cell, in metres, and its change in a step.
-    depths: Vec<f32>,
-    changes: Vec<f32>,
+    pub unit: f32,
+    /// Depth on each cell, in metres.
+    pub depths: Vec<f32>,
     /// Cells that have ever been wet.
-    wet: Vec<u32>,
+    pub wet: Vec<u32>,
     is_wet: Vec<bool>,
-    /// Numbers of cells in the mesh, while the mesh is made.
-    numbers: Vec<u32>,
+    /// Change of each depth in a step.
+    changes: Vec<f32>,
+    /// Time since the film began, and when blood last ran through each cell, in seconds.
+    now: f32,
+    ran: Vec<f32>,
     /// Neighbours of a cell, while it flows.
     around: Vec<u32>,
-    mesh: Option<Handle<Mesh>>,
 }
 
 impl Film {
@@ -76,13 +58,18 @@ impl Film {
             skin,
             unit,
             depths: vec![0.0; cells],
-            changes: vec![0.0; cells],
             wet: Vec::new(),
             is_wet: vec![false; cells],
-            numbers: vec![NONE; cells],
+            changes: vec![0.0; cells],
+            now: 0.0,
+            ran: vec![0.0; cells],
             around: Vec::new(),
-            mesh: None,
         }
+    }
+
+    /// The clotted share of the blood on a cell.
+    pub fn clotted(&self, cell: u32) -> f32 {
+        1.0 - ops::exp((self.ran[cell as usize] - self.now) / CLOTS)
     }
 
     /// Adds blood at a place on the surface at rest: half of it to the nearest cell, half to those around it.
@@ -94,6 +81,7 @@ impl Film {
         let here = if around.is_empty() { 1.0 } else { 0.5 };
         for (cell, share) in around.iter().map(|&cell| (cell, share)).chain([(cell, here)]) {
             self.depths[cell as usize] += share * cubic_metres / self.area(cell);
+            self.ran[cell as usize] = self.now;
             self.moisten(cell);
         }
     }
@@ -111,6 +99,7 @@ impl Film {
 
     /// Lets the film flow. Calls `drip` for blood that falls off, with the point at rest and the normal.
     pub fn flow(&mut self, seconds: f32, mut drip: impl FnMut(Vec3, Vec3, Volume)) {
+        self.now += seconds;
         let steps = (seconds / STEP).ceil();
         for _ in 0..steps as u32 {
             for index in 0..self.wet.len() {
@@ -183,126 +172,9 @@ impl Film {
             self.changes[from as usize] -= volume / self.area(from);
             self.changes[to as usize] += volume / self.area(to);
             self.moisten(to);
-        }
-    }
-
-    /// The present mesh of the film; `None` if nothing is visible, since a mesh without triangles can't be drawn.
-    fn draw(&mut self, surface: &Surface) -> Option<Mesh> {
-        // Two rings around the wet cells, over which the film fades.
-        let mut cells: Vec<u32> =
-            self.wet.iter().copied().filter(|&cell| self.depths[cell as usize] > 1.0e-6).collect();
-        if cells.is_empty() {
-            return None;
-        }
-        cells.iter().enumerate().for_each(|(number, &cell)| self.numbers[cell as usize] = number as u32);
-        let mut inner = self.surround(&mut cells, 0);
-        inner = self.surround(&mut cells, inner);
-        let mut indices = Vec::new();
-        for (number, &cell) in cells[..inner].iter().enumerate() {
-            for triangle in self.skin.triangles_around(cell) {
-                let corners = self.skin.triangles[triangle as usize].map(|corner| self.numbers[corner as usize]);
-                // Each triangle once, by the first of its corners.
-                if corners.iter().all(|&corner| corner >= number as u32) {
-                    indices.extend(corners);
-                }
+            if volume > RESTS * self.depths[to as usize] * self.area(to) {
+                self.ran[to as usize] = self.now;
             }
-        }
-        let depths = self.smooth_depths(&cells, inner);
-        cells.iter().for_each(|&cell| self.numbers[cell as usize] = NONE);
-        let top = |(&cell, depth): (&u32, &f32)| {
-            let normal = self.skin.normals[cell as usize];
-            surface.breathed(self.skin.positions[cell as usize]) + normal * (LIFT + RELIEF * depth / self.unit)
-        };
-        let positions: Vec<Vec3> = cells.iter().zip(&depths).map(top).collect();
-        let normals = self.normals(&cells, &positions, &indices);
-        let colors: Vec<[f32; 4]> = depths.iter().copied().map(color).collect();
-        let mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
-            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
-            .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
-            .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colors)
-            .with_inserted_indices(Indices::U32(indices));
-        Some(mesh)
-    }
-
-    /// Adds the missing neighbours of all cells from a number on, and returns the previous number of cells.
-    fn surround(&mut self, cells: &mut Vec<u32>, from: usize) -> usize {
-        let before = cells.len();
-        for index in from..before {
-            for neighbour in self.skin.neighbours(cells[index]) {
-                if self.numbers[neighbour as usize] == NONE {
-                    self.numbers[neighbour as usize] = cells.len() as u32;
-                    cells.push(neighbour);
-                }
-            }
-        }
-        before
-    }
-
-    /// Depths to be drawn: means over neighbours, which hide the cells. Those on the rim are 0.
-    fn smooth_depths(&self, cells: &[u32], inner: usize) -> Vec<f32> {
-        let mut depths: Vec<f32> = cells.iter().map(|&cell| self.depths[cell as usize]).collect();
-        for _ in 0..SMOOTHED {
-            let before = depths.clone();
-            for (depth, &cell) in depths[..inner].iter_mut().zip(cells) {
-                let around = self.skin.neighbours(cell).map(|other| before[self.numbers[other as usize] as usize]);
-                let (sum, count) = around.fold((0.0, 0.0), |(sum, count), depth| (sum + depth, count + 1.0_f32));
-                *depth = 0.4 * *depth + 0.6 * sum / count.max(1.0);
-            }
-        }
-        depths
-    }
-
-    /// Normals of the film's own surface.
-    fn normals(&self, cells: &[u32], positions: &[Vec3], indices: &[u32]) -> Vec<Vec3> {
-        let mut sums = vec![Vec3::ZERO; cells.len()];
-        for corners in indices.chunks_exact(3) {
-            let [a, b, c] = [corners[0], corners[1], corners[2]].map(|corner| positions[corner as usize]);
-            let normal = (b - a).cross(c - a);
-            corners.iter().for_each(|&corner| sums[corner as usize] += normal);
-        }
-        let own = |(&cell, sum): (&u32, &Vec3)| sum.normalize_or(self.skin.normals[cell as usize]);
-        cells.iter().zip(&sums).map(own).collect()
-    }
-}
-
-/// Linear colour of blood of a depth, with its opacity.
-fn color(depth: f32) -> [f32; 4] {
-    let share = ((depth - CLEAR) / (OPAQUE - CLEAR)).clamp(0.0, 1.0);
-    let hidden = share * share * (3.0 - 2.0 * share);
-    LIGHT_COLOR.lerp(DARK_COLOR, 1.0 - ops::exp(-depth / DARK)).extend(0.97 * hidden).to_array()
-}
-
-/// Draws the film.
-pub fn show_film(
-    mut commands: Commands,
-    film: Option<ResMut<Film>>,
-    surface: Option<Res<Surface>>,
-    mut meshes: ResMut<Assets<Mesh>>,
-    materials: Option<ResMut<Assets<StandardMaterial>>>,
-) {
-    let (Some(mut film), Some(surface), Some(mut materials)) = (film, surface, materials) else { return };
-    let Some(mesh) = film.draw(&surface) else { return };
-    match &film.mesh {
-        Some(handle) => {
-            if let Some(mut drawn) = meshes.get_mut(handle.id()) {
-                *drawn = mesh;
-            }
-        }
-        None => {
-            let handle = meshes.add(mesh);
-            let blood = StandardMaterial {
-                alpha_mode: AlphaMode::Blend,
-                perceptual_roughness: 0.16,
-                reflectance: 0.45,
-                ..default()
-            };
-            commands.spawn((
-                Mesh3d(handle.clone()),
-                MeshMaterial3d(materials.add(blood)),
-                NotShadowCaster,
-                NoFrustumCulling,
-            ));
-            film.mesh = Some(handle);
         }
     }
 }

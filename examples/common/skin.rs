@@ -5,8 +5,8 @@ use bevy_vessels::synthesis::mesh::{SurfacePoint, TriangleMesh};
 use std::collections::HashMap;
 
 /// Distance between neighbouring cells, in world units, and the most parts of an edge, which may limit it.
-const SPACING: f32 = 0.003;
-const MOST_PARTS: u32 = 6;
+const SPACING: f32 = 0.0018;
+const MOST_PARTS: u32 = 10;
 
 /// Points on the surface at rest, joined by triangles that divide those of the organ.
 pub struct Skin {
