@@ -16,6 +16,7 @@
 //! [`PanelFocus`] tells whether the pointer and the keys belong to the panel. A camera that asks it never moves while
 //! the panel is used.
 
+mod brush;
 mod colonization;
 mod focus;
 mod generator;
@@ -24,15 +25,20 @@ mod history;
 mod knob;
 mod optimisation;
 mod organ;
+mod overlay;
+mod painting;
 mod panel;
+mod pointer;
 mod preset;
 mod products;
 mod sketch;
 mod state;
 mod statistics;
+mod stroke;
 mod surgery;
 mod widgets;
 
+pub use brush::Brush;
 pub use focus::PanelFocus;
 pub use state::{PanelTool, VesselPanel};
 
@@ -54,11 +60,12 @@ impl Plugin for VesselPanelPlugin {
         }
         app.init_resource::<VesselPanel>()
             .init_resource::<PanelFocus>()
+            .init_resource::<painting::Painting>()
             .init_resource::<products::ProductNews>()
             .init_resource::<panel::PanelMemory>()
             .add_systems(PreUpdate, focus::note_focus.after(EguiPreUpdateSet::BeginPass))
-            .add_systems(Update, (surgery::operate, products::hear))
-            .add_systems(EguiPrimaryContextPass, panel::show_panel.run_if(is_open));
+            .add_systems(Update, (surgery::operate, painting::paint, overlay::lay_paint, products::hear))
+            .add_systems(EguiPrimaryContextPass, (overlay::draw_lines, panel::show_panel).chain().run_if(is_open));
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::{
     generator, growth,
-    history::History,
+    history::{History, Work},
     knob::Rows,
     organ,
+    painting::{self, Painting},
     preset::{self, Base},
     products::{self, ProductNews},
     sketch::Sketches,
@@ -13,11 +14,11 @@ use super::{
     surgery::{self, LossCurve},
 };
 use crate::plugin::{
-    BloodLoss, CuttableVessels, GrowthCommand, GrowthControl, GrowthProgress, GrowthState, OrganVessels, Patient,
-    RegrowsUnseen, SegmentColoring, Vasculature, VesselAppearance, VesselMaps, VesselMesh, VesselSurface,
+    BloodLoss, CuttableVessels, GrowthCommand, GrowthControl, GrowthProgress, GrowthState, OrganPaint, OrganVessels,
+    Patient, RegrowsUnseen, SegmentColoring, Vasculature, VesselAppearance, VesselMaps, VesselMesh, VesselSurface,
     VesselTexture, Vessels, job::Jobs,
 };
-use crate::synthesis::tree::VesselKind;
+use crate::synthesis::{roots::RootPlacement, tree::VesselKind};
 use bevy::{
     ecs::{query::QueryData, system::SystemParam},
     platform::collections::HashMap,
@@ -52,6 +53,7 @@ pub(super) struct Organ {
     entity: Entity,
     name: Option<&'static Name>,
     wish: &'static mut Vasculature,
+    paint: Option<&'static mut OrganPaint>,
     control: &'static GrowthControl,
     progress: &'static GrowthProgress,
     state: &'static GrowthState,
@@ -75,6 +77,7 @@ pub(super) struct Tools<'w, 's> {
     meshes: Query<'w, 's, &'static VesselMesh>,
     news: ResMut<'w, ProductNews>,
     jobs: Jobs<'w>,
+    painting: Res<'w, Painting>,
     time: Res<'w, Time>,
 }
 
@@ -134,7 +137,7 @@ impl PanelMemory {
             tools.growth.write(GrowthCommand::new(organ.entity, action));
         }
         ui.separator();
-        self.show_wish(ui, panel, organ);
+        self.show_wish(ui, panel, organ, tools);
         let mut look = organ.look.clone();
         CollapsingHeader::new("Looks").show(ui, |ui| show_look(ui, &mut look, organ.progress));
         organ.look.set_if_neq(look);
@@ -162,14 +165,15 @@ impl PanelMemory {
     }
 
     /// Shows what makes an organ's vessels, and takes changes over.
-    fn show_wish(&mut self, ui: &mut Ui, panel: &mut VesselPanel, organ: &mut OrganItem) {
+    fn show_wish(&mut self, ui: &mut Ui, panel: &mut VesselPanel, organ: &mut OrganItem, tools: &mut Tools) {
         // A draft, so that only changes are changes.
-        let mut draft = organ.wish.clone();
-        let wish = &mut draft;
-        self.history.note(organ.entity, wish, ui.ctx().egui_is_using_pointer());
+        let paint = organ.paint.as_deref().cloned().unwrap_or_default();
+        let mut draft = Work { wish: organ.wish.clone(), paint };
+        self.history.note(organ.entity, &draft, tools.painting.goes_on() || ui.ctx().egui_is_using_pointer());
+        ui.horizontal(|ui| self.history.show(ui, organ.entity, &mut draft));
+        let Work { wish, paint } = &mut draft;
         let base = self.bases.entry(organ.entity).or_insert_with(|| Base::of(wish));
         preset::show(ui, wish, base, &mut self.preset_file, &mut self.told_of_preset);
-        ui.horizontal(|ui| self.history.show(ui, organ.entity, wish));
         organ::show_seed(ui, &mut wish.seed);
         let mut rows = Rows { sketches: &mut self.sketches, fitted: wish.fit };
         CollapsingHeader::new("Settings").default_open(true).show(ui, |ui| {
@@ -179,7 +183,19 @@ impl PanelMemory {
             organ::show_tissue(ui, &mut wish.tissue);
             organ::show_roots(ui, &mut wish.roots);
         });
-        organ.wish.set_if_neq(draft);
+        CollapsingHeader::new("Paint").show(ui, |ui| {
+            let grows = |kind| wish.roots[kind] != RootPlacement::None;
+            painting::show(ui, &mut panel.tool, &mut panel.brush, grows);
+            if ui.add_enabled(!paint.is_blank(), egui::Button::new("clear all paint")).clicked() {
+                *paint = OrganPaint::default();
+            }
+        });
+        match &mut organ.paint {
+            Some(own) => drop(own.set_if_neq(std::mem::take(paint))),
+            None if !paint.is_blank() => drop(tools.commands.entity(organ.entity).insert(std::mem::take(paint))),
+            None => {}
+        }
+        organ.wish.set_if_neq(draft.wish);
     }
 }
 

@@ -1,5 +1,7 @@
 //! What an app may read and set of the panel.
 
+use super::brush::Brush;
+use crate::synthesis::tree::VesselKind;
 use bevy::prelude::*;
 
 /// The panel of vessels.
@@ -9,15 +11,17 @@ pub struct VesselPanel {
     pub open: bool,
     /// The organ that it shows. `None`, or an entity that is gone: the first one. Default: `None`.
     pub organ: Option<Entity>,
-    /// What the primary button of the pointer does to the organ's vessels. Default: [`PanelTool::Hand`].
+    /// What the primary button of the pointer does to the organ and its vessels. Default: [`PanelTool::Hand`].
     pub tool: PanelTool,
+    /// How painting tools paint.
+    pub brush: Brush,
     /// Whether a change of the arteries' settings changes the veins' alike. Default: true.
     pub linked: bool,
 }
 
 impl Default for VesselPanel {
     fn default() -> Self {
-        Self { open: true, organ: None, tool: PanelTool::default(), linked: true }
+        Self { open: true, organ: None, tool: PanelTool::default(), brush: Brush::default(), linked: true }
     }
 }
 
@@ -37,11 +41,31 @@ pub enum PanelTool {
     Ligature,
     /// Seals small vessels that it touches.
     Cautery,
+    /// Draws guides for large vessels, and moves their points.
+    Guide,
+    /// Paints the density of vessels.
+    Density,
+    /// Paints where no vessel may be.
+    NoGo,
+    /// Places roots of a kind, and moves them.
+    Root(VesselKind),
 }
 
 impl PanelTool {
-    /// All tools.
-    pub const ALL: [Self; 6] = [Self::Hand, Self::Scalpel, Self::Clamp, Self::Unclamp, Self::Ligature, Self::Cautery];
+    /// The tools that operate on vessels, after the empty hand.
+    pub const OPERATING: [Self; 6] =
+        [Self::Hand, Self::Scalpel, Self::Clamp, Self::Unclamp, Self::Ligature, Self::Cautery];
+
+    /// The tools that paint on the organ.
+    pub const PAINTING: [Self; 7] = [
+        Self::Guide,
+        Self::Density,
+        Self::NoGo,
+        Self::Root(VesselKind::Artery),
+        Self::Root(VesselKind::Vein),
+        Self::Root(VesselKind::PortalVein),
+        Self::Root(VesselKind::Duct),
+    ];
 
     /// Its name in the panel.
     pub fn name(self) -> &'static str {
@@ -52,6 +76,18 @@ impl PanelTool {
             Self::Unclamp => "unclamp",
             Self::Ligature => "ligate",
             Self::Cautery => "cautery",
+            Self::Guide => "guide",
+            Self::Density => "density",
+            Self::NoGo => "no-go",
+            Self::Root(VesselKind::Artery) => "arterial root",
+            Self::Root(VesselKind::Vein) => "venous root",
+            Self::Root(VesselKind::PortalVein) => "portal root",
+            Self::Root(VesselKind::Duct) => "ductal root",
         }
+    }
+
+    /// Whether it paints on the organ.
+    pub fn paints(self) -> bool {
+        Self::PAINTING.contains(&self)
     }
 }

@@ -1,7 +1,7 @@
 //! Operating tools in the pointer's hand, and the patient's loss of blood.
 
 use super::{
-    focus::PanelFocus,
+    pointer::Pointer,
     state::{PanelTool, VesselPanel},
     widgets::still_plot,
 };
@@ -34,33 +34,24 @@ pub(super) struct Drag {
 /// Works with the tool in hand, where the pointer is.
 pub(super) fn operate(
     panel: Res<VesselPanel>,
-    focus: Res<PanelFocus>,
-    buttons: Res<ButtonInput<MouseButton>>,
-    windows: Query<&Window>,
-    cameras: Query<(&Camera, &GlobalTransform), With<Camera3d>>,
+    pointer: Pointer,
     all: Query<(&Vessels, &GlobalTransform)>,
     picker: VesselPicker,
     vessels: Option<ResMut<CuttableVessels>>,
     mut drag: Local<Option<Drag>>,
 ) -> Result {
-    let works = panel.tool != PanelTool::Hand && buttons.pressed(MouseButton::Left) && !focus.is_over_panel();
+    let works = panel.tool != PanelTool::Hand && !panel.tool.paints() && pointer.works();
     let (Some(mut vessels), true) = (vessels, works) else {
         *drag = None;
         return Ok(());
     };
-    let pointer = || {
-        let (camera, place) = cameras.iter().find(|(camera, _)| camera.is_active)?;
-        let cursor = windows.iter().find_map(Window::cursor_position)?;
-        camera.viewport_to_world(place, cursor).ok()
-    };
-    let Some(ray) = pointer() else { return Ok(()) };
+    let Some(ray) = pointer.ray() else { return Ok(()) };
     let touched = picker.ray(ray, f32::INFINITY);
     let size = all.iter().map(|(vessels, place)| world_size(vessels, place)).fold(0.0, f32::max);
     let is_new = drag.is_none();
     let Some(now) = grasp(&mut drag, touched.as_ref()) else { return Ok(()) };
     let point = ray.get_point(now.depth);
     match panel.tool {
-        PanelTool::Hand => {}
         PanelTool::Scalpel => {
             let edge = [-EDGE, EDGE].map(|along| point + along * size * *ray.direction);
             if let Some(before) = now.edge.replace(edge) {
@@ -77,7 +68,7 @@ pub(super) fn operate(
         PanelTool::Clamp if is_new => vessels.clamp(point, REACH * size),
         PanelTool::Unclamp if is_new => vessels.unclamp_near(point, REACH * size),
         PanelTool::Ligature if is_new => vessels.ligate(point, REACH * size),
-        PanelTool::Clamp | PanelTool::Unclamp | PanelTool::Ligature => {}
+        _ => {}
     }
     Ok(())
 }
@@ -135,7 +126,7 @@ pub(super) fn show(
     (curve, time): (&mut LossCurve, f64),
 ) {
     ui.horizontal_wrapped(|ui| {
-        for choice in PanelTool::ALL {
+        for choice in PanelTool::OPERATING {
             ui.selectable_value(tool, choice, choice.name());
         }
     });

@@ -52,7 +52,8 @@ const RENDER: &str = "
 
 /// Files of `ui`, each with those that it uses.
 const UI: &str = "
- state
+ brush
+ state          brush
  widgets
  sketch
  history
@@ -62,12 +63,16 @@ const UI: &str = "
  statistics     widgets
  products
  focus          state
- surgery        state  widgets  focus
+ pointer        focus
+ surgery        state  widgets  pointer
+ stroke         brush  state
+ painting       brush  state  pointer  stroke
+ overlay        state  painting
  knob           sketch
  colonization   widgets  knob
  optimisation   knob
  generator      widgets  sketch  knob  colonization  optimisation
- panel          state  sketch  history  growth  organ  preset  statistics  products  surgery  knob  generator
+ panel          state  sketch  history  growth  organ  preset  statistics  products  surgery  painting  knob  generator
 ";
 
 /// A table: the name of each row, with its entries.

@@ -20,7 +20,7 @@ use crate::plugin::{
 };
 use crate::synthesis::{
     growth::{Growth, GrowthWarning},
-    mesh::TriangleMesh,
+    mesh::{IndexedMesh, TriangleMesh},
     preset::Preset,
     tissue::{Tissue, TissuePaint},
     tree::ByKind,
@@ -95,6 +95,12 @@ impl GrowthState {
     /// ready.
     pub fn mesh(&self) -> Option<&TriangleMesh> {
         self.tissue.as_ref().and_then(PaintedTissue::mesh)
+    }
+
+    /// That mesh with an index of its triangles, to find what a ray or a brush touches. The first call makes the index,
+    /// in some ten milliseconds, if the tissue needs none itself.
+    pub fn canvas(&self) -> Option<&IndexedMesh> {
+        self.tissue.as_ref().and_then(PaintedTissue::canvas)
     }
 
     /// Why the growth failed, if it did.

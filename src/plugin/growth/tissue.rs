@@ -12,7 +12,7 @@ use crate::plugin::{
     },
 };
 use crate::synthesis::{
-    mesh::TriangleMesh,
+    mesh::{IndexedMesh, TriangleMesh},
     pace::Pace,
     tissue::{PreparedTissue, SourceData, Tissue, TissueError, TissuePaint, TissueSource},
 };
@@ -52,6 +52,11 @@ impl PaintedTissue {
     /// The mesh that it is made from, if any.
     pub(crate) fn mesh(&self) -> Option<&TriangleMesh> {
         self.base.mesh()
+    }
+
+    /// That mesh with an index of its triangles.
+    pub(crate) fn canvas(&self) -> Option<&IndexedMesh> {
+        self.base.canvas_mesh()
     }
 
     /// Work of laying other paint over it, in items.

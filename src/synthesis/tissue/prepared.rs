@@ -81,6 +81,12 @@ impl PreparedTissue {
         self.canvas.as_ref().map(|canvas| &*canvas.mesh)
     }
 
+    /// That mesh with an index of its triangles, to find what a ray or a brush touches. The index is made at the first
+    /// call if the tissue itself needs none.
+    pub fn canvas_mesh(&self) -> Option<&IndexedMesh> {
+        self.canvas.as_deref().map(Canvas::indexed)
+    }
+
     /// The tissue with paint laid over it. Nothing is prepared again. With blank paint, this is the
     /// [`tissue`](Self::tissue) itself.
     ///
