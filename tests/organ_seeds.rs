@@ -24,7 +24,6 @@ fn liver(seed: u64) -> ShadedMesh {
     LiverSettings { seed, subdivisions: 4, ..Default::default() }.generate().expect("within limits").mesh
 }
 
-/// Of the default size: coarser triangles cut the corners of folds, and so through the thin wall.
 fn colon(seed: u64) -> ShadedMesh {
     ColonSettings { seed, ..Default::default() }.generate().expect("within limits").mesh
 }
@@ -149,6 +148,22 @@ fn a_hundred_colons_are_sound_and_human() {
     }
     assert_eq!(different(SEEDS.map(colon)), 100);
     assert_eq!(colon(41), colon(41));
+}
+
+/// Chords cut the corners of folds: those of both sides of the thin wall have to cut them alike.
+#[test]
+fn the_walls_of_coarse_colons_do_not_meet() {
+    for (triangles, seed) in [12_000, 30_000].into_iter().flat_map(|size| SEEDS.map(move |seed| (size, seed))) {
+        let colon = ColonSettings { seed, triangles, ..Default::default() }.generate().expect("within limits");
+        let (mesh, name) = (&colon.mesh, format!("colon {seed} of {triangles} triangles"));
+        let all = welded(mesh);
+        let closure = Closure::of(&mesh.positions, &all);
+        assert!(closure.is_closed() && closure.is_oriented() && closure.is_manifold(), "{name}: {closure:?}");
+        assert_eq!(closure.euler(), 2, "{name}");
+        assert_eq!(self_intersections(&mesh.positions, &all), [[0; 2]; 0], "{name}: it meets itself");
+        let share = mesh.triangles.len() as f32 / triangles as f32;
+        assert!((0.9..1.1).contains(&share), "{name}: {}", mesh.triangles.len());
+    }
 }
 
 /// As users get them: the finer mesh follows sharper creases.

@@ -3,7 +3,8 @@
 use crate::meshes::{baked, cube, linear, plain, square, vessel};
 use bevy_math::{Vec2, Vec3};
 use bevy_vessels::synthesis::{
-    mesh::TriangleMesh,
+    mesh::{ShadedMesh, TriangleMesh},
+    organ::KidneySettings,
     pace::{Pace, at_once},
     texture::{
         Bake, BakeError, BakeSettings, BakeWarning, BaseImage, Canvas, CanvasAttributes, Layer, MapKind, Maps,
@@ -113,6 +114,21 @@ fn colours_per_vertex_are_part_of_the_base() {
     let bad = VertexColors { colors: vec![Vec3::NEG_ONE; uvs.len()], are_drawn: true };
     let attributes = CanvasAttributes { uvs, colors: Some(bad), ..CanvasAttributes::default() };
     assert_eq!(Canvas::new(mesh, attributes).err(), Some(BakeError::BadAttribute { what: "colour", vertex: 0 }));
+}
+
+#[test]
+fn a_shaded_mesh_without_colours_is_white() {
+    let mut mesh = KidneySettings { triangles: 2_000, ..KidneySettings::default() }.generate().expect("a kidney").mesh;
+    let tree = vessel(&[Vec3::new(-0.02, 0.0, 0.02), Vec3::new(0.02, 0.0, 0.02)], 0.004);
+    let painted = |mesh: &ShadedMesh| {
+        baked(&Canvas::of_shaded(mesh).expect("a canvas"), &[&tree], &plain(), 64, &[MapKind::Albedo])
+    };
+    mesh.colors.fill([1.0; 4]);
+    let white = painted(&mesh);
+    mesh.colors.clear();
+    assert!(painted(&mesh) == white && white.maps[0].levels[0].contains(&0));
+    mesh.colors = vec![[1.0; 4]; 3];
+    assert!(matches!(Canvas::of_shaded(&mesh), Err(BakeError::AttributeCount { what: "colours", count: 3, .. })));
 }
 
 #[test]

@@ -44,6 +44,9 @@ fn extent(mesh: &TriangleMesh) -> f32 {
     (bounds.max - bounds.min).length()
 }
 
+/// Maps whose values run on across seams.
+const SEAMLESS: [MapKind; 4] = [MapKind::Albedo, MapKind::Normal, MapKind::Height, MapKind::Roughness];
+
 #[test]
 fn real_organs_with_charts_have_no_seams() {
     for (name, charts) in [("eyeball_mh_uv", 1..=2000), ("kidney_left_vhf_uv", 1..=2000)] {
@@ -52,11 +55,13 @@ fn real_organs_with_charts_have_no_seams() {
         let canvas = Canvas::of_mesh(&mesh).expect("a canvas");
         let tree = over(&mesh, 0.004 * extent(&mesh));
         let look = VesselLook::of(VesselKind::Artery);
-        let bake = baked(&canvas, &[&tree], &look, 512, &[MapKind::Albedo]);
+        let bake = baked(&canvas, &[&tree], &look, 512, &SEAMLESS);
         assert!(charts.contains(&bake.report.charts) && !seams(&canvas).is_empty(), "{name}");
-        for level in 0..=4 {
-            let step = largest_step(&canvas, &bake, MapKind::Albedo, level);
-            assert!(step <= mark(MapKind::Albedo), "{name}, level {level}: {step} of 255");
+        for kind in SEAMLESS {
+            for level in 0..=4 {
+                let step = largest_step(&canvas, &bake, kind, level);
+                assert!(step <= mark(kind), "{name}, {kind:?}, level {level}: {step} of 255");
+            }
         }
     }
 }
@@ -67,10 +72,10 @@ fn the_colon_is_painted_over_its_seams_and_poles() {
     let canvas = Canvas::of_shaded(&colon.mesh).expect("a canvas");
     let mesh = colon.mesh.triangle_mesh().expect("a mesh");
     let tree = over(&mesh, 0.002);
-    let bake = baked(&canvas, &[&tree], &VesselLook::default(), 256, &[MapKind::Albedo, MapKind::Normal]);
+    let bake = baked(&canvas, &[&tree], &VesselLook::default(), 256, &SEAMLESS);
     assert_eq!((bake.report.charts, bake.report.repeats), (4, [false; 2]));
     assert!(bake.report.texels > 256 * 230, "{} texels", bake.report.texels);
-    for kind in [MapKind::Albedo, MapKind::Normal] {
+    for kind in SEAMLESS {
         for level in 0..=4 {
             let step = largest_step(&canvas, &bake, kind, level);
             assert!(step <= mark(kind), "{kind:?}, level {level}: {step} of 255");

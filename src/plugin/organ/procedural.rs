@@ -6,17 +6,19 @@ use bevy::{
     mesh::{Indices, Mesh, PrimitiveTopology},
 };
 
-/// A triangle list with positions, normals, UVs, vertex colours, and tangents where the UVs allow it. Both worlds keep it,
-/// so that vessels can grow on it and be painted into its texture.
+/// A triangle list with positions, normals, UVs, vertex colours if there are any, and tangents where the UVs allow it.
+/// Both worlds keep it, so that vessels can grow on it and be painted into its texture.
 impl From<ShadedMesh> for Mesh {
     fn from(organ: ShadedMesh) -> Self {
         let tangents = Canvas::of_shaded(&organ).map(|canvas| canvas.tangents().to_vec());
-        let mesh = Self::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+        let mut mesh = Self::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
             .with_inserted_attribute(Self::ATTRIBUTE_POSITION, organ.positions)
             .with_inserted_attribute(Self::ATTRIBUTE_NORMAL, organ.normals)
             .with_inserted_attribute(Self::ATTRIBUTE_UV_0, organ.uvs)
-            .with_inserted_attribute(Self::ATTRIBUTE_COLOR, organ.colors)
             .with_inserted_indices(Indices::U32(organ.triangles.into_iter().flatten().collect()));
+        if !organ.colors.is_empty() {
+            mesh.insert_attribute(Self::ATTRIBUTE_COLOR, organ.colors);
+        }
         match tangents {
             Ok(tangents) => mesh.with_inserted_attribute(Self::ATTRIBUTE_TANGENT, tangents),
             Err(_) => mesh,

@@ -115,7 +115,8 @@ impl Canvas {
         Ok(Self { mesh, uvs, normals, tangents, colors, welds, sources: None, flat_uvs })
     }
 
-    /// A canvas of a mesh with all drawing attributes, whose colours are drawn.
+    /// A canvas of a mesh with all drawing attributes, whose colours are drawn. Without colours it is white, as a renderer
+    /// draws it.
     ///
     /// # Errors
     /// Those of [`new`](Self::new), and a mesh that is not usable.
@@ -135,7 +136,7 @@ impl Canvas {
             uvs: mesh.uvs.clone(),
             normals: Some(mesh.normals.clone()),
             tangents: None,
-            colors: Some(VertexColors { colors, are_drawn: true }),
+            colors: (!mesh.colors.is_empty()).then_some(VertexColors { colors, are_drawn: true }),
         };
         Self::new_paced(checked, attributes, &pace.part(0.1..1.0)).await
     }

@@ -51,6 +51,7 @@ mod gutter;
 mod limits;
 mod look;
 mod maps;
+mod marks;
 mod meeting;
 mod mips;
 mod owners;

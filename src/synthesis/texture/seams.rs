@@ -16,6 +16,7 @@ use super::atlas::Atlas;
 use super::bytes::{normal_bytes, normal_of};
 use super::canvas::Canvas;
 use super::maps::Level;
+use super::marks::Marks;
 use super::settings::MapKind;
 use super::srgb::Srgb;
 use crate::synthesis::pace::Pace;
@@ -31,6 +32,9 @@ const MOST_SWEEPS: u32 = 512;
 /// Of so many of them, the first ones blur, and the others close what is left.
 const ROUND: u32 = 64;
 const BLURS: u32 = 6;
+/// Most times that points which are still open are closed one after the other (Kaczmarz, 1937): few, where charts of a
+/// texel or two meet.
+const MOST_PROJECTIONS: u32 = 512;
 /// Share of the last change that a further one goes on with (Polyak's heavy ball, 1964).
 const MOMENTUM: f32 = 0.9;
 /// Least volume of a frame that spans space.
@@ -83,6 +87,8 @@ pub(super) async fn close(level: &mut Level, canvas: &Canvas, atlas: &Atlas, pac
     }
     let srgb = Srgb::tables();
     let plain = |low: Vec3, high: Vec3| 255.0 * (high - low).max_element();
+    // What a map cannot hold would be cut off when it is written, and leave a step.
+    let unit = |value: Vec3| value.clamp(Vec3::ZERO, Vec3::ONE);
     let share = |number: usize| pace.part(0.2 + 0.2 * number as f32..0.4 + 0.2 * number as f32);
     if let Some(map) = &mut level.maps[MapKind::Albedo as usize] {
         let get = |bytes: &[u8]| Vec3::from_array([bytes[0], bytes[1], bytes[2]].map(|byte| srgb.decode(byte)));
@@ -91,13 +97,13 @@ pub(super) async fn close(level: &mut Level, canvas: &Canvas, atlas: &Atlas, pac
                 [low, high].map(|color| Vec3::from_array(color.to_array().map(|value| srgb.scale(value))));
             (high - low).max_element()
         };
-        let changed = points.agree(points.values(map, 4, get), &[], step, &share(0)).await;
+        let changed = points.agree((points.values(map, 4, get), unit), &[], step, &share(0)).await;
         points.write((map, 4), &changed, |value| value.to_array().map(|channel| srgb.encode(channel)));
     }
     if let Some(map) = &mut level.maps[MapKind::Normal as usize] {
         let frames = points.frames(canvas);
         let step = |low: Vec3, high: Vec3| 127.5 * (high - low).max_element();
-        let changed = points.agree(points.values(map, 4, normal_of), &frames, step, &share(1)).await;
+        let changed = points.agree((points.values(map, 4, normal_of), |value| value), &frames, step, &share(1)).await;
         points.write((map, 4), &changed, |value| {
             let [x, y, z, _] = normal_bytes(value.normalize_or(Vec3::Z));
             [x, y, z]
@@ -105,12 +111,12 @@ pub(super) async fn close(level: &mut Level, canvas: &Canvas, atlas: &Atlas, pac
     }
     if let Some(map) = &mut level.maps[MapKind::Height as usize] {
         let get = |bytes: &[u8]| Vec3::splat(f32::from(u16::from_le_bytes([bytes[0], bytes[1]])) / 65535.0);
-        let changed = points.agree(points.values(map, 2, get), &[], plain, &share(2)).await;
+        let changed = points.agree((points.values(map, 2, get), unit), &[], plain, &share(2)).await;
         points.write((map, 2), &changed, |value| ((value.x * 65535.0 + 0.5) as u16).to_le_bytes());
     }
     if let Some(map) = &mut level.maps[MapKind::Roughness as usize] {
         let get = |bytes: &[u8]| Vec3::splat(f32::from(bytes[1]) / 255.0);
-        let changed = points.agree(points.values(map, 4, get), &[], plain, &share(3)).await;
+        let changed = points.agree((points.values(map, 4, get), unit), &[], plain, &share(3)).await;
         points.write((map, 4), &changed, |value| [255, (value.x * 255.0 + 0.5) as u8]);
     }
 }
@@ -199,10 +205,10 @@ impl Points {
 
     /// Changes texels until all sides agree. Returns those that have changed. `frames` turn what each view sees into
     /// what can be compared; without any, it can be as it is. `step` measures the step between the least and the
-    /// greatest that a point shows.
+    /// greatest that a point shows. `held` is the value nearest to one that a map can hold.
     async fn agree(
         &self,
-        mut values: Vec<Vec3>,
+        (mut values, held): (Vec<Vec3>, impl Fn(Vec3) -> Vec3),
         frames: &[Frame],
         step: impl Fn(Vec3, Vec3) -> f32,
         pace: &Pace,
@@ -236,8 +242,9 @@ impl Points {
                 } else {
                     let missing = |view: usize| shown.means[self.points[view] as usize] - shown.seen[view];
                     let goes_on = if last.0 + 1 == sweep { MOMENTUM * last.1 } else { Vec3::ZERO };
-                    *last = (sweep, self.mean(texel, frames, missing) + goes_on);
-                    *value += last.1;
+                    let next = held(*value + self.mean(texel, frames, missing) + goes_on);
+                    *last = (sweep, next - *value);
+                    *value = next;
                 }
                 self.seeing(texel).iter().for_each(|&(view, _)| point_marks.add(self.points[view as usize]));
                 if !std::mem::replace(&mut has_changed[texel as usize], true) {
@@ -248,6 +255,32 @@ impl Points {
             let is_open = |point: &u32| shown.look(self, *point, &values, frames, &step) > SMALL;
             open.extend(point_marks.marked.iter().copied().filter(is_open));
             pace.rest(1.0 - 0.5 / (sweep + 2) as f32).await;
+        }
+        for _ in 0..MOST_PROJECTIONS {
+            if open.is_empty() {
+                break;
+            }
+            point_marks.clear();
+            for &point in &open {
+                shown.look(self, point, &values, frames, &step);
+                for view in self.views_of(point) {
+                    let missing = shown.means[point as usize] - shown.seen[view];
+                    let missing = frames.get(view).map_or(missing, |frame| frame.from_space * missing);
+                    let View { texels, weights, .. } = &self.views[view];
+                    let squared: f32 = weights.iter().map(|weight| weight * weight).sum();
+                    for (&texel, weight) in texels.iter().zip(weights) {
+                        let value = &mut values[texel as usize];
+                        *value = held(*value + missing * (weight / squared));
+                        self.seeing(texel).iter().for_each(|&(view, _)| point_marks.add(self.points[view as usize]));
+                        if !std::mem::replace(&mut has_changed[texel as usize], true) {
+                            changed.push(texel);
+                        }
+                    }
+                }
+            }
+            open.clear();
+            let is_open = |point: &u32| shown.look(self, *point, &values, frames, &step) > SMALL;
+            open.extend(point_marks.marked.iter().copied().filter(is_open));
         }
         changed.into_iter().map(|texel| (texel, values[texel as usize])).collect()
     }
@@ -344,29 +377,5 @@ impl View {
     /// Whether another one sees the same texels with the same weights.
     fn is_like(&self, other: &Self) -> bool {
         self.texels == other.texels && self.weights.iter().zip(other.weights).all(|(a, b)| (a - b).abs() < SAME)
-    }
-}
-
-/// A set of numbers that is emptied often.
-struct Marks {
-    is_marked: Vec<bool>,
-    marked: Vec<u32>,
-}
-
-impl Marks {
-    fn of(count: usize) -> Self {
-        Self { is_marked: vec![false; count], marked: Vec::new() }
-    }
-
-    fn add(&mut self, number: u32) {
-        if !std::mem::replace(&mut self.is_marked[number as usize], true) {
-            self.marked.push(number);
-        }
-    }
-
-    fn clear(&mut self) {
-        for number in self.marked.drain(..) {
-            self.is_marked[number as usize] = false;
-        }
     }
 }

@@ -87,6 +87,10 @@ struct Ring {
 /// Rings across the rim, between the last of the outer side and the first of the inner.
 const RIM_RINGS: usize = 5;
 
+/// Thicknesses of the wall between two rings from which on a chord of one side may cut the other, if their rings are
+/// not at the same places.
+const COARSE: f32 = 2.0;
+
 fn build(settings: &ColonSettings) -> Colon {
     let wall = Wall::new(settings, &mut Stream::Organ.rng(settings.seed));
     let outer = profile(&wall, Side::Outer);
@@ -99,23 +103,35 @@ fn build(settings: &ColonSettings) -> Colon {
     let outer_rings = ((rings as f32 * outer.length / length) as usize).max(8);
     let inner_rings = rings.saturating_sub(outer_rings + RIM_RINGS).max(8);
 
+    let inner_arcs: Vec<f32> = inner.arcs(inner_rings).collect();
+    let is_coarse = length > COARSE * settings.wall_thickness * rings as f32;
+    let outer_arcs =
+        if is_coarse { beside(&outer, &inner_arcs, outer_rings) } else { outer.arcs(outer_rings).collect() };
+    let outer_rings = outer_arcs.len();
     let mut sequence: Vec<Ring> =
-        outer.arcs(outer_rings).map(|arc| Ring { side: Side::Outer, arc, across_rim: 0.0 }).collect();
+        outer_arcs.into_iter().map(|arc| Ring { side: Side::Outer, arc, across_rim: 0.0 }).collect();
     sequence.extend((1..=RIM_RINGS).map(|k| Ring {
         side: Side::Inner,
         arc: wall.end,
         across_rim: k as f32 / (RIM_RINGS + 1) as f32,
     }));
     let mut inward: Vec<Ring> =
-        inner.arcs(inner_rings).map(|arc| Ring { side: Side::Inner, arc, across_rim: 1.0 }).collect();
+        inner_arcs.into_iter().map(|arc| Ring { side: Side::Inner, arc, across_rim: 1.0 }).collect();
     inward.reverse();
     sequence.append(&mut inward);
 
-    let mesh = sweep(&wall, &sequence, columns);
+    let mesh = sweep(&wall, &sequence, columns, is_coarse);
     let strip = |rings: usize| columns + (rings - 2) * 2 * columns;
     let outer = 0..strip(outer_rings);
     let inner = mesh.triangles.len() - strip(inner_rings)..mesh.triangles.len();
     describe(&wall, mesh, outer, inner)
+}
+
+/// Arc lengths of about so many rings of the outer side: those of the inner one, and before the lumen begins, at equal
+/// distances.
+fn beside(outer: &Profile, inner: &[f32], rings: usize) -> Vec<f32> {
+    let lumen = inner.get(1).copied().unwrap_or(0.0);
+    outer.arcs(rings).take_while(|&arc| arc < lumen).chain(inner.iter().copied().skip(1)).collect()
 }
 
 /// Arc length of the centre line as a function of the length along one side of the wall.
@@ -160,8 +176,9 @@ fn profile(wall: &Wall, side: Side) -> Profile {
     Profile { samples, length: walked }
 }
 
-/// Sweeps the wall along the rings.
-fn sweep(wall: &Wall, rings: &[Ring], columns: usize) -> ShadedMesh {
+/// Sweeps the wall along the rings. If `turned`, cells of the inner side are divided as those of the outer one beside
+/// them are; otherwise, as they lie in the texture.
+fn sweep(wall: &Wall, rings: &[Ring], columns: usize, turned: bool) -> ShadedMesh {
     let angles: Vec<f32> = (0..=columns).map(|column| column_angle(column, columns)).collect();
     let row = columns + 1;
     let mut mesh = ShadedMesh::default();
@@ -206,6 +223,10 @@ fn sweep(wall: &Wall, rings: &[Ring], columns: usize) -> ShadedMesh {
         for column in 0..columns {
             let [a, b] = [below + column, below + column + 1].map(|vertex| vertex as u32);
             let [c, d] = [above + column, above + column + 1].map(|vertex| vertex as u32);
+            if ring + 2 < rings.len() && ring > 0 && turned && rings[ring].across_rim == 1.0 {
+                mesh.triangles.extend([[a, b, c], [b, d, c]]);
+                continue;
+            }
             if ring + 2 < rings.len() {
                 mesh.triangles.push([a, d, c]);
             }
