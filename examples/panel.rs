@@ -10,7 +10,7 @@
 //! | `A`, `V`, `C`, `M` | arteries, veins, colours, mesh |
 //! | F1 | the panel on and off |
 //! | F12 | a picture of the window, `panel-N.png` |
-//! | Ctrl Z, Ctrl Shift Z | undo, redo of settings |
+//! | Ctrl Z, Ctrl Shift Z | undo, redo of settings, paint and roots |
 //!
 //! `--headless` draws to a file instead, which is also the behaviour without a display.
 
