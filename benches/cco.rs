@@ -1,8 +1,9 @@
 //! The speed of constrained constructive optimisation, on one thread: per terminal in a disc and a ball, as OpenCCO was
 //! measured (12.9 ms a terminal for 1000 in a ball), and of tens of thousands of terminals in real organs.
 //!
-//! `cargo bench --bench cco` runs everything up to 20,000 terminals; `-- large` runs 100,000 and 500,000 in a liver,
-//! once each, and prints bytes a terminal. Organs are found as `CONTRIBUTING.md` says; without them they are left out.
+//! `cargo bench --bench cco` runs everything up to 20,000 terminals; `-- large` grows 20,000, 100,000 and 500,000 in a
+//! liver, once each, and prints CPU seconds, the longest step and the most bytes at a time. A number after `large` is
+//! the most terminals to grow. Organs are found as `CONTRIBUTING.md` says; without them they are left out.
 //! Times on a shared machine vary: compare only lines of one run.
 
 use bevy_math::Vec3;
@@ -12,8 +13,41 @@ use bevy_vessels::synthesis::{
     roots::{RootPlacement, RootPlacements},
     tissue::{Ball, Disc, Extent, MeshVolume, Tissue},
 };
+use cpu_time::ProcessTime;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group};
-use std::{path::Path, sync::Arc, time::Instant};
+use std::{
+    alloc::{GlobalAlloc, Layout, System as Heap},
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Duration,
+};
+
+/// Bytes in use, and the most of them so far.
+static BYTES: AtomicUsize = AtomicUsize::new(0);
+static MOST_BYTES: AtomicUsize = AtomicUsize::new(0);
+
+struct Counting;
+
+// SAFETY: every call goes on to the system's allocator unchanged.
+#[expect(unsafe_code, reason = "an allocator cannot be written otherwise")]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let bytes = BYTES.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
+        MOST_BYTES.fetch_max(bytes, Ordering::Relaxed);
+        unsafe { Heap.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        BYTES.fetch_sub(layout.size(), Ordering::Relaxed);
+        unsafe { Heap.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
 
 /// An organ's volume, in metres.
 fn organ(name: &str) -> Option<Arc<dyn Tissue>> {
@@ -22,8 +56,8 @@ fn organ(name: &str) -> Option<Arc<dyn Tissue>> {
     Some(Arc::new(MeshVolume::new(&mesh, MeshVolume::DEFAULT_RESOLUTION).expect("a closed organ")))
 }
 
-/// Grows the arteries of an organ whose lengths are metres, without sweeps at the end.
-fn grow(tissue: &Arc<dyn Tissue>, terminals: u32, root: RootPlacement) -> Cco {
+/// Prepares the arteries of an organ whose lengths are metres, without sweeps at the end.
+fn start(tissue: &Arc<dyn Tissue>, terminals: u32, root: RootPlacement) -> Cco {
     let perfusion = match tissue.extent() {
         Extent::Volume(volume) | Extent::Sheet { volume, .. } => volume * 1e9,
         Extent::Area(area) => area * 1e6,
@@ -31,7 +65,12 @@ fn grow(tissue: &Arc<dyn Tissue>, terminals: u32, root: RootPlacement) -> Cco {
     };
     let settings = CcoSettings { terminals, perfusion, polish_sweeps: 0, ..CcoSettings::default() };
     let roots = RootPlacements { artery: root, vein: RootPlacement::None, ..RootPlacements::default() };
-    let mut growth = Cco::new(Arc::clone(tissue), settings, &roots.into(), 1).expect("a growth");
+    Cco::new(Arc::clone(tissue), settings, &roots.into(), 1).expect("a growth")
+}
+
+/// Grows them.
+fn grow(tissue: &Arc<dyn Tissue>, terminals: u32, root: RootPlacement) -> Cco {
+    let mut growth = start(tissue, terminals, root);
     growth.run().expect("room for all terminals");
     growth
 }
@@ -71,22 +110,44 @@ fn organs(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Up to a million vessels: seconds, and bytes a terminal.
-fn large() {
+/// Up to a million vessels: CPU seconds, the longest step, and bytes.
+fn large(most_terminals: u32) {
     let Some(tissue) = organ("liver_vhf") else { return };
-    for terminals in [20_000, 100_000, 500_000] {
-        let start = Instant::now();
-        let growth = on_one_thread(|| grow(&tissue, terminals, RootPlacement::Spread(1)));
-        let bytes = growth.bytes() as f64 / f64::from(terminals);
-        println!("liver, {terminals} terminals: {:.1} s, {bytes:.0} bytes each", start.elapsed().as_secs_f64());
+    for terminals in [20_000, 100_000, 500_000].into_iter().filter(|&terminals| terminals <= most_terminals) {
+        let before = BYTES.load(Ordering::Relaxed);
+        MOST_BYTES.store(before, Ordering::Relaxed);
+        let begun = ProcessTime::now();
+        let mut longest = Duration::ZERO;
+        let growth = on_one_thread(|| {
+            let mut growth = start(&tissue, terminals, RootPlacement::Spread(1));
+            while !growth.is_finished() {
+                let step = ProcessTime::now();
+                growth.advance();
+                longest = longest.max(step.elapsed());
+            }
+            growth.settle();
+            growth
+        });
+        let (seconds, longest) = (begun.elapsed().as_secs_f64(), 1e3 * longest.as_secs_f64());
+        let most = MOST_BYTES.load(Ordering::Relaxed) - before;
+        let each = [most, growth.bytes()].map(|bytes| bytes as f64 / f64::from(terminals));
+        println!(
+            "liver, {terminals} terminals: {seconds:.2} CPU s, longest step {longest:.2} CPU ms, at most {:.1} MB \
+             ({:.0} bytes a terminal, {:.0} of them the growth's), {} overlaps",
+            most as f64 / 1e6,
+            each[0],
+            each[1],
+            growth.overlaps()
+        );
     }
 }
 
 criterion_group!(benches, shapes, organs);
 
 fn main() {
+    let mut arguments = std::env::args().skip_while(|argument| argument != "large").skip(1);
     if std::env::args().any(|argument| argument == "large") {
-        return large();
+        return large(arguments.find_map(|most| most.parse().ok()).unwrap_or(u32::MAX));
     }
     benches();
     Criterion::default().configure_from_args().final_summary();

@@ -95,6 +95,8 @@ struct Job {
     surface: Option<SurfaceSettings>,
     /// Whether they are measured.
     mesh_figures: bool,
+    /// Whether the vessels' statistics are reported: in JSON, in files or in a summary of several organs.
+    statistics: bool,
     /// What textures are made, if any are wanted.
     painting: Option<Painting>,
 }
@@ -196,6 +198,7 @@ fn prepare(options: &Options) -> Result<Job, Failure> {
         obj_sides: options.obj_sides,
         surface,
         mesh_figures: options.mesh || options.json,
+        statistics: options.json || options.out.is_some() || options.count > 1,
         painting,
     })
 }

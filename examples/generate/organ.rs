@@ -81,6 +81,7 @@ impl<'a> Grower<'a> {
             Some(scale) => flows(&trees, scale).map_err(|error| named(&error))?,
             None => ByKind::default(),
         };
+        let samples = self.job.statistics.then_some(&mut self.samples);
         let hash = hash_trees(growth.trees().values().flatten().map(|grown| grown.tree));
         let mut line = Line {
             tissue: self.job.tissue_name.clone(),
@@ -94,7 +95,7 @@ impl<'a> Grower<'a> {
             steps: growth.progress().done,
             grow_ms: (grow_ms * 1e3).round() / 1e3,
             hash: format!("{hash:016x}"),
-            kinds: KindMeasures::of(growth, &*self.job.tissue, &mut self.samples, &measured, &flows),
+            kinds: KindMeasures::of(growth, &*self.job.tissue, samples, &measured, &flows),
             cco: CcoFigures::of(growth),
             bake: None,
             files: Vec::new(),

@@ -10,7 +10,7 @@ use bevy_vessels::synthesis::{
     random::Stream,
     tissue::{Extent, Tissue},
     tree::{
-        ByKind, VesselKind,
+        ByKind, VesselKind, VesselTree,
         statistics::{self, StrahlerOrder},
     },
 };
@@ -164,19 +164,26 @@ pub struct KindMeasures(ByKind<Option<Measures>>);
 impl KindMeasures {
     /// Measures the vessels of a finished growth.
     ///
-    /// `meshes` are the surfaces to measure, `flows` the solved flows.
+    /// `samples` are for the statistics; without, only nodes and leaves are counted. `meshes` are the surfaces to
+    /// measure, `flows` the solved flows.
     pub fn of(
         growth: &dyn Growth,
         tissue: &dyn Tissue,
-        samples: &mut Samples,
+        samples: Option<&mut Samples>,
         meshes: &ByKind<Option<&Meshed>>,
         flows: &ByKind<Option<Network>>,
     ) -> Self {
-        let samples = samples.over(tissue.at_step(growth.progress().done));
+        let samples = samples.map(|samples| samples.over(tissue.at_step(growth.progress().done)));
         Self(growth.trees().map(|kind, grown| {
             let mesh = meshes[kind].map(MeshFigures::of);
             let inflow_ml_per_min = flows[kind].as_ref().map(|network| network.inflow().ml_per_min());
-            grown.map(|grown| Measures { mesh, inflow_ml_per_min, ..Measures::of(grown, tissue, samples) })
+            grown.map(|grown| Measures {
+                nodes: grown.tree.len(),
+                leaves: leaves(grown.tree),
+                statistics: samples.map(|samples| Statistics::of(grown, tissue, samples)),
+                inflow_ml_per_min,
+                mesh,
+            })
         }))
     }
 
@@ -205,11 +212,24 @@ impl<'de> Deserialize<'de> for KindMeasures {
     }
 }
 
-/// Statistics of the centre lines of one kind. Values that a tree does not have are null.
+/// Measures of one kind of vessels.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Measures {
     nodes: usize,
     leaves: usize,
+    /// Only where they are reported.
+    #[serde(flatten)]
+    statistics: Option<Statistics>,
+    /// Flow through the roots, negative out of the tissue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    inflow_ml_per_min: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mesh: Option<MeshFigures>,
+}
+
+/// Statistics of the centre lines of one kind. Values that a tree does not have are null.
+#[derive(Debug, Serialize, Deserialize)]
+struct Statistics {
     bifurcations: usize,
     total_length: f64,
     root_radius: Option<f32>,
@@ -225,11 +245,12 @@ pub struct Measures {
     tortuosity_median: Option<f64>,
     coverage: Option<f32>,
     outside: usize,
-    /// Flow through the roots, negative out of the tissue.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    inflow_ml_per_min: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    mesh: Option<MeshFigures>,
+}
+
+/// Ends of vessels; a root that has not grown is none.
+fn leaves(tree: &VesselTree) -> usize {
+    let roots: Vec<usize> = tree.roots().collect();
+    tree.tips().iter().filter(|&&tip| roots.binary_search(&(tip as usize)).is_err()).count()
 }
 
 /// The vessels of one Strahler order.
@@ -247,15 +268,13 @@ impl From<&StrahlerOrder> for OrderMeasures {
     }
 }
 
-impl Measures {
+impl Statistics {
     /// Measures the vessels of one kind.
     ///
     /// The terminal radius is the median over the leaves. Coverage is the share of the samples that count as supplied.
     fn of(GrownTree { tree, reach, .. }: GrownTree, tissue: &dyn Tissue, samples: &[Vec3]) -> Self {
         let measured = tree.statistics();
         Self {
-            nodes: measured.nodes,
-            leaves: measured.leaves,
             bifurcations: measured.bifurcations,
             total_length: measured.total_length,
             root_radius: measured.root_radius.map(|radius| radius as f32),
@@ -270,8 +289,6 @@ impl Measures {
             tortuosity_median: measured.tortuosity.map(|tortuosity| tortuosity.median),
             coverage: statistics::coverage(tree, samples, reach),
             outside: statistics::outside(tree, |node| tissue.contains(node)),
-            inflow_ml_per_min: None,
-            mesh: None,
         }
     }
 }
