@@ -252,12 +252,12 @@ mod tests {
     #[test]
     fn a_brush_touches_again_only_after_a_way() {
         let mesh = square();
-        let (mut paint, mut roots, mut stroke) = Default::default();
-        let mut touch = |stroke: &mut PaintStroke, x| {
+        let (mut paint, mut roots) = Default::default();
+        let mut stroke = PaintStroke::begin();
+        let mut touch = |x| {
             let point = Vec3::new(x, -5.0, 0.0);
             stroke.touch(PanelTool::Density, &brush(), Canvas::new(&mesh), point, (&mut paint, &mut roots))
         };
-        stroke = PaintStroke::begin();
-        assert!(touch(&mut stroke, -5.0) && !touch(&mut stroke, -4.9) && touch(&mut stroke, -4.0));
+        assert!(touch(-5.0) && !touch(-4.9) && touch(-4.0));
     }
 }
