@@ -25,7 +25,7 @@ use bevy_vessels::{
 /// Its limits are in metres.
 const DROP_SHARE: f32 = 1.6;
 const SMALLEST: f32 = 0.000_12;
-const LARGEST: f32 = 0.000_45;
+const LARGEST: f32 = 0.000_7;
 /// Most drops in the air.
 const MOST_DROPS: usize = 5000;
 /// Least speed of a jet, in m/s.
