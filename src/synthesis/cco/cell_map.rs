@@ -39,13 +39,6 @@ fn hash(key: u32) -> u32 {
 }
 
 impl CellMap {
-    pub(super) fn clear(&mut self) {
-        for part in &mut self.parts {
-            part.slots.fill([FREE, 0]);
-            part.len = 0;
-        }
-    }
-
     fn part(key: u32) -> usize {
         (hash(key) >> (u32::BITS - PART_BITS)) as usize
     }
@@ -121,7 +114,5 @@ mod tests {
         assert!(keys().all(|key| map.get(key) == Some(key)));
         // Between a half and three quarters full.
         assert!((60_000 * 8 * 4 / 3..60_000 * 8 * 21 / 10).contains(&map.bytes()), "{} bytes", map.bytes());
-        map.clear();
-        assert_eq!(map.get(4), None);
     }
 }

@@ -36,13 +36,6 @@ impl DwindlingList {
         self.len == 0
     }
 
-    /// Empties the list.
-    pub(super) fn clear(&mut self) {
-        self.blocks.clear();
-        self.moved = CellMap::default();
-        self.len = 0;
-    }
-
     /// Adds a number that is larger than all before, to a list that has lost none.
     pub(super) fn push(&mut self, number: u32) {
         let bit = 1 << (number % 64);
@@ -57,6 +50,23 @@ impl DwindlingList {
             }
         }
         self.len += 1;
+    }
+
+    /// Takes out a number, if it is there, from a list that has lost none otherwise. Then the list must be counted.
+    pub(super) fn strike(&mut self, number: u32) {
+        if let Ok(at) = self.blocks.binary_search_by_key(&(number / 64), |block| block.number) {
+            self.blocks[at].bits &= !(1 << (number % 64));
+        }
+    }
+
+    /// Counts the numbers again, after some were struck.
+    pub(super) fn count(&mut self) {
+        self.blocks.retain(|block| block.bits != 0);
+        self.len = 0;
+        for block in &mut self.blocks {
+            block.place = self.len;
+            self.len += block.bits.count_ones();
+        }
     }
 
     /// The number at a place.
@@ -95,11 +105,16 @@ mod tests {
     #[test]
     fn numbers_are_where_a_plain_list_has_them() {
         let mut rng = Stream::Statistics.rng(2);
-        let mut list = DwindlingList::default();
         for share in [0.9, 0.3, 0.01] {
-            list.clear();
+            let mut list = DwindlingList::default();
             let mut plain: Vec<u32> = (0..40_000).filter(|_| rng.random::<f64>() < share).collect();
-            plain.iter().for_each(|&number| list.push(number));
+            for &number in &plain {
+                list.push(number);
+            }
+            let is_struck = |number: &u32| number % 7 == 3 || (640..900).contains(number);
+            (0..40_000).filter(is_struck).for_each(|number| list.strike(number));
+            plain.retain(|number| !is_struck(number));
+            list.count();
             let at_start = list.bytes();
             // A plain list takes four bytes a number.
             assert!(plain.len() < 10_000 || at_start < 2 * plain.len(), "{at_start} bytes for {} numbers", plain.len());
