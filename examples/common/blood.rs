@@ -71,10 +71,17 @@ struct Dripping {
 }
 
 /// The mesh of drops, and the material of blood that is thick.
-#[derive(Resource, Clone)]
+#[derive(Resource)]
 pub struct Look {
     mesh: Handle<Mesh>,
     pub material: Handle<StandardMaterial>,
+}
+
+impl Look {
+    /// What a drop is drawn with.
+    fn of_drop(&self) -> impl Bundle + use<> {
+        (Mesh3d(self.mesh.clone()), MeshMaterial3d(self.material.clone()), NotShadowCaster)
+    }
 }
 
 fn mix_blood(
@@ -171,8 +178,7 @@ fn bleed(
             let jet = Some((entity, dripping.drops));
             let drop = Drop { velocity, volume, radius: ball_radius(volume) / unit, age, jet, thread: thread / unit };
             let pose = drop.pose(place.translation() + velocity * age);
-            let look = (Mesh3d(look.mesh.clone()), MeshMaterial3d(look.material.clone()));
-            commands.spawn((drop, look, pose, NotShadowCaster));
+            commands.spawn((drop, look.of_drop(), pose));
         }
     }
 }
@@ -249,7 +255,7 @@ fn run(
         let radius = ball_radius(volume) / unit;
         let drop = Drop { velocity: Vec3::ZERO, volume, radius, age: 0.0, jet: None, thread: 0.0 };
         let pose = drop.pose(surface.breathed(at) + normal * drop.radius);
-        let mut spawned = commands.spawn((drop, pose, NotShadowCaster));
-        look.as_ref().map(|look| spawned.insert((Mesh3d(look.mesh.clone()), MeshMaterial3d(look.material.clone()))));
+        let mut spawned = commands.spawn((drop, pose));
+        look.as_ref().map(|look| spawned.insert(look.of_drop()));
     });
 }

@@ -49,11 +49,12 @@ pub fn show_jets(
     for pair in young.windows(2) {
         let [Some((end, number)), Some(next)] = [pair[0].0.jet, pair[1].0.jet] else { continue };
         if next == (end, number + 1) {
-            tube.connect(pair.iter().map(|(drop, place)| Knot {
+            let knot = |(drop, place): (&Drop, &Transform)| Knot {
                 position: place.translation,
                 age: drop.age,
                 radius: drop.thread,
-            }));
+            };
+            tube.connect(knot(pair[0]), knot(pair[1]));
         }
     }
     match &*drawn {
@@ -84,9 +85,7 @@ struct Tube {
 
 impl Tube {
     /// The stretch between two drops.
-    fn connect(&mut self, ends: impl Iterator<Item = Knot>) {
-        let ends: Vec<Knot> = ends.collect();
-        let &[a, b] = ends.as_slice() else { return };
+    fn connect(&mut self, a: Knot, b: Knot) {
         let Ok(along) = Dir3::new(b.position - a.position) else { return };
         let (across, up) = along.any_orthonormal_pair();
         let first = self.positions.len() as u32;
